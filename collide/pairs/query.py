@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from collide.narrowphase.convex_kernel_calls import finish_distances
 from collide.narrowphase.dispatch import REFUSED, Method, method_of
 from collide.narrowphase.single_queries import asks_prepared_pairs
 from collide.pairs.batches import answer_batch, length_of, prepare_pair
+from collide.pairs.least_depths import checked_depth, shorten_depths
 from collide.pairs.optional_algorithms import named_algorithm
 from collide.pairs.pair_arguments import asked_poses, pose_at, shape_at
 from collide.pairs.security_margin import checked_margin, within
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from collide.transforms import Pose, PoseLike
 
     Shapes = Shape | Sequence[Shape]
+    Depth = Literal["quick", "least"]
 
 
 @overload
@@ -161,12 +163,12 @@ def _with_axes(A, B, X_WA, X_WB, check_poses: bool, threads: int, axes):
 @overload
 def distance(
     A: Shape, B: Shape, X_WA: Pose, X_WB: Pose, *, max_distance: float = ..., signed: bool = ...,
-    check_poses: bool = ..., threads: int = ..., algorithm: str | None = ...,
+    check_poses: bool = ..., threads: int = ..., algorithm: str | None = ..., depth: Depth = ...,
 ) -> PairResult[Single]: ...
 @overload
 def distance(
     A: Shapes, B: Shapes, X_WA: PoseLike, X_WB: PoseLike, *, max_distance: float = ..., signed: bool = ...,
-    check_poses: bool = ..., threads: int = ..., algorithm: str | None = ...,
+    check_poses: bool = ..., threads: int = ..., algorithm: str | None = ..., depth: Depth = ...,
 ) -> PairResult: ...
 @asks_prepared_pairs(prepare_pair, PairResult, certify)
 def distance(
@@ -180,6 +182,7 @@ def distance(
     check_poses=True,
     threads=1,
     algorithm=None,
+    depth="quick",
 ):
     """Signed distance of A and B, with witness points, normal and a proven bracket.
 
@@ -200,6 +203,10 @@ def distance(
         "gjk" (or ``None``), the default; or "dobkin-kirkpatrick", for two convex polytopes, one thread and no
         max_distance: gaps are found down bounded hierarchies, and settled in integers. The same numbers to their last
         digit, and slower (docs/barba-langerman.md).
+    depth : str
+        Of overlapping bodies that are not convex: "quick", a translation that separates the bodies, short as a rule; or
+        "least", the shortest one known, with a bracket of 0.1 % where the search ends by itself: for `Compound` of
+        bounded convex shapes, milliseconds to a second a pose. Not with an algorithm. All other rows are the same.
 
     Returns
     -------
@@ -227,6 +234,9 @@ def distance(
     """
     limit = checks.limit("max_distance", max_distance)
     signed = checks.true_or_false("signed", signed)
+    least = checked_depth(depth) and signed
+    if least and algorithm is not None:
+        raise InvalidArgument('depth="least" goes with no algorithm: leave out either')
     answer = None if algorithm is None else named_algorithm("distance", algorithm)
     if answer is not None:
         if limit != math.inf or check_threads(threads) != 1:
@@ -234,7 +244,7 @@ def distance(
         return answer(A, B, X_WA, X_WB, check_poses, signed)
     X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
     question = Question(False, limit, signed, checks.true_or_false("check_poses", check_poses))
-    if prepare_pair(A, B) and single:
+    if prepare_pair(A, B) and single and not least:
         return distance(
             A, B, X_WA[0], X_WB[0], max_distance=limit, signed=signed, check_poses=question.check, threads=threads
         )
@@ -246,6 +256,8 @@ def distance(
             unbounded.append(True)
 
     rows = answer_batch(A, B, X_WA, X_WB, question, threads, finish=finish, pose_copies=pose_copies)
+    if least:
+        shorten_depths(rows, A, B, X_WA, X_WB)
     if unbounded:
         k = int(np.argmax(np.isneginf(rows["distance"])))
         where = "" if single else f" (pose {k} of the batch)"

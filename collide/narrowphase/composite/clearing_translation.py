@@ -52,6 +52,13 @@ CLEARING = _POINTS + _WEIGHTS
 _ROUNDS = 48
 #: Planes less steep than this along the direction bound nothing.
 _LEAST_SLOPE = 2.0**-20
+#: A search for a plane ends at a point this much farther away than the plane at most, or with the plane as far as this
+#: part of the way there.
+_NEAR_ENOUGH, _FAR = 1.0 + 2.0**-20, 2.0**-3
+#: Points nearer to a surface than this part of the way there are seen from farther along.
+_STEP = 2.0**-16
+#: Points of less weight are rounding: with them the direction is across a face beside an edge that is nearest.
+_LEAST_WEIGHT = 2.0**-40
 #: The balls about the parts' frames are worked out in doubles.
 _UP = 1 + 2.0**-40
 
@@ -61,6 +68,14 @@ class Length(NamedTuple):
 
     value: float
     proven: float
+
+
+class Plane(NamedTuple):
+    """A plane with all of A ⊖ B behind the plane, where m·y ≤ height; m is a unit vector but for rounding, the height
+    [m] has no error in it, and is −∞ where no plane was met."""
+
+    m: Vec3
+    height: float
 
 
 class _Simplex(NamedTuple):
@@ -74,7 +89,8 @@ class _Simplex(NamedTuple):
 class _Line(NamedTuple):
     """The line {τ·e} beside A ⊖ B of a pair of parts swept by a radius.   error : of a plane.   curved : a core is.
 
-    has_plane : the pair's A is a half-space, which the other leaves once height < τ · slope; slope −∞ of two of them.
+    has_plane : the pair's A is a half-space with this normal, which the other leaves once height < τ · slope; slope −∞
+        of two of them.
     """
 
     e: Vec3
@@ -84,6 +100,7 @@ class _Line(NamedTuple):
     has_plane: bool
     height: float
     slope: float
+    nhat: Vec3
 
 
 @kernel
@@ -104,7 +121,7 @@ def clearing_length(parts, first_a, n_a, first_b, n_b, n, start, limit, work_at)
     for _ in range(n_a * n_b + 1):
         farthest = length
         for pa in range(first_a, first_a + n_a):
-            held = _held_in(parts, pa)
+            held = held_in(parts, pa)
             for pb in range(first_b, first_b + n_b):
                 if _are_balls_apart(parts, pa, pb, n, length.proven, held):
                     continue
@@ -126,8 +143,63 @@ def barred_length(parts, pa, pb, n, work_at):
     return _bounded_by_planes(pair, line, _simplex_at(work_at))
 
 
+@kernel
+def plane_beside(parts, pa, pb, n, tau, work_at):
+    """A `Plane` between τ·n and A ⊖ B of two parts, across the way to τ·n from the nearest point of a near A ⊖ B.
+
+    A point on the surface has no way from the surface: the plane is the plane of a point a little farther along n.
+    """
+    pair, line = _pair_and_line(parts, pa, pb, n)
+    simplex = _simplex_at(work_at)
+    plane, margin = _plane_beside(pair, line, tau, simplex)
+    if not margin > _STEP * tau:
+        beyond, margin_beyond = _plane_beside(pair, line, tau * (1.0 + 2.0 * _STEP), simplex)
+        if margin_beyond > 0.0:
+            plane = beyond
+    return Plane(neg(plane.m) if dot(line.e, n) < 0.0 else plane.m, plane.height)
+
+
+@kernel
+def _plane_beside(pair, line, tau, simplex):
+    """(the `Plane` as the pair stands, how far τ·e lies beyond the plane [m])."""
+    x = scale(tau, line.e)
+    if line.has_plane:
+        return Plane(line.nhat, line.height), tau * line.slope - line.height
+    m = add(x, pair.t)
+    if not norm(m) > 0.0:
+        m = line.e
+    best, margin = Plane(m, -math.inf), -math.inf
+    n_points = 0
+    square = math.inf
+    for _ in range(_ROUNDS):
+        m = scale(1.0 / norm(m), m)
+        w = _farthest(pair, m)
+        height = dot(w, m) + line.radius
+        if dot(x, m) - height > margin:
+            best, margin = Plane(m, height), dot(x, m) - height
+        n_points = _take_point(simplex, n_points, w)
+        n_points, nearer = _nearest_to(simplex, n_points, x)
+        if not line.radius * line.radius < nearer < square:
+            break
+        if margin > _FAR * tau or math.sqrt(nearer) - line.radius <= margin * _NEAR_ENOUGH:
+            break
+        square = nearer
+        m = _direction(simplex, n_points, line.curved)
+        if not norm(m) > 0.0:
+            break
+    return best, margin
+
+
 @kernel(inline=True)
-def _held_in(parts, part):
+def is_out_of_reach(parts, pa, pb, length, held):
+    """Whether A ⊖ B of two parts has no point within a length of 0 [m], by the balls around both, held : `held_in` of
+    A's part; rounding is left out: for proposals."""
+    apart = sub(vec3_at(parts.poses, POSE * pb + 9), vec3_at(parts.poses, POSE * pa + 9))
+    return norm(apart) > length + held + held_in(parts, pb)
+
+
+@kernel(inline=True)
+def held_in(parts, part):
     """Radius [m] of a ball around a part's origin that holds the posed part, stretch and rounding included; infinite of
     a half-space."""
     shape = parts.shape_of[part]
@@ -141,13 +213,13 @@ def _held_in(parts, part):
 def _are_balls_apart(parts, pa, pb, n, tau, held):
     """Whether B's part moved by τ·n is clear of A's by the balls around both, seen before either is opened.
 
-    held : `_held_in` of A's part [m].   Both are apart where the distance of their origins exceeds the sum of both
+    held : `held_in` of A's part [m].   Both are apart where the distance of their origins exceeds the sum of both
     balls' radii. `_apart_at` asks the same with an error, 2⁻⁴⁶ of a size of at most the sum of both radii, τ and the
     distance of the origins: 2⁻³⁶ of the same sum is more, and a pair left out here is left out by `_apart_at`. Squares
     that underflow leave no pair out.
     """
     apart = add(scale(tau, n), sub(vec3_at(parts.poses, POSE * pb + 9), vec3_at(parts.poses, POSE * pa + 9)))
-    reach = (held + _held_in(parts, pb)) * (1 + 2.0**-36) + 2.0**-36 * tau
+    reach = (held + held_in(parts, pb)) * (1 + 2.0**-36) + 2.0**-36 * tau
     return dot(apart, apart) > reach * reach * (1 + 2.0**-36) + 1e-290
 
 
@@ -171,13 +243,13 @@ def _pair_and_line(parts, pa, pb, n):
     size, slop, _ = size_and_slop(numbers, poses, sa, pa, sb, pb)
     radius = radius_of(pair, pair.A) + radius_of(pair, pair.B)
     curved = pair.A.kind != POINTS or pair.B.kind != POINTS
-    e = neg(n) if flip else n
+    e, none = neg(n) if flip else n, Vec3(0.0, 0.0, 0.0)
     if pair.A.kind != HALFSPACE:
-        return pair, _Line(e, radius, ERROR * size + slop, curved, False, 0.0, 0.0)
+        return pair, _Line(e, radius, ERROR * size + slop, curved, False, 0.0, 0.0, none)
     if pair.B.kind == HALFSPACE:
-        return pair, _Line(e, radius, 0.0, curved, True, 0.0, -math.inf)
+        return pair, _Line(e, radius, 0.0, curved, True, 0.0, -math.inf, none)
     near = plane_gap(OrderedPair(pair, ints, flip, size, slop, False))
-    return pair, _Line(e, radius, near.error, curved, True, -near.gap, dot(near.nhat, e))
+    return pair, _Line(e, radius, near.error, curved, True, -near.gap, dot(near.nhat, e), near.nhat)
 
 
 @kernel
@@ -283,7 +355,7 @@ def _nearest_to(simplex, n_points, x):
     square = nearest_of_all(points, n_points, weights, 15)
     n_kept = 0
     for k in range(n_points):
-        if weights[k] > 0.0:
+        if weights[k] > _LEAST_WEIGHT:
             if n_kept != k:
                 copy_coordinates(points, k, points, n_kept)
             n_kept += 1

@@ -2,8 +2,9 @@
 
 Apart, the distance of two unions is the least distance of their parts. Overlapping, the length of the smallest
 separating translation has no formula; two bounds are proven. Each overlapping pair of parts must come apart, so the
-length is at least the depth of the deepest pair. Along the normals of overlapping parts and the axes of the deepest
-two the unions are clear from a length on (`clearing_translation.py`); the least of these lengths is reported.
+length is at least the depth of the deepest pair. Along the normals of overlapping parts, and along and between axes of
+the deepest, the unions are clear from a length on (`clearing_translation.py`). From the least of these lengths shorter
+translations are descended to (`shorter_ways.py`); the last is reported.
 Half-spaces among the parts may bar all these directions without end: for unions with half-spaces the ways out of all
 half-spaces are tried, too (`ways_out.py`).
 """
@@ -18,6 +19,7 @@ from collide.lowering.packed_convex import HALFSPACE, POINTS
 from collide.lowering.shape_table import INTS, KIND, NUMBERS, POSE, RADIUS, REACH
 from collide.narrowphase.bounds import PROMISE_CURVED, PROMISE_STORED
 from collide.narrowphase.composite.clearing_translation import CLEARING, Length, barred_length, clearing_length, longer
+from collide.narrowphase.composite.shorter_ways import SHORTER, shorter_way
 from collide.narrowphase.composite.ways_out import MAX_PLANES, PLANE, gather_planes, is_halfspace, way_out
 from collide.narrowphase.posed_pair import in_order
 from collide.narrowphase.rows import (
@@ -39,10 +41,10 @@ from collide.narrowphase.rows import (
 )
 from collide.numerics.vec3 import Vec3, add, neg, norm, put_vec3, scale, sub, vec3_at
 
-#: Normals of overlapping parts that are tried for a separating translation, deepest first; then axes, three of either
-#: frame, both ways.
-MAX_NORMALS = 8
-_N_AXES = 12
+#: Normals of overlapping parts to be tried for a separating translation, deepest first; then axes of the deepest
+#: overlap's first part, both ways, and a direction in each octant between the axes, with these coordinates.
+MAX_NORMALS, _N_AXES, _N_BETWEEN = 4, 6, 8
+_OFF_AXES = Vec3(0.8, 0.55, 0.25)
 
 # Doubles of a score, what is known of a pair of bodies from the rows so far: the least distance, the number of its row,
 # ends of the bracket, the least lower end of a row that is not certified, rounds, whether a row is a hit, how far other
@@ -56,7 +58,7 @@ _DISTANCE, _NUMBER, _OF_A, _OF_B, _VECTORS = range(5)
 _OVERLAP = _VECTORS + 9
 SCORE = _DEEPEST + MAX_NORMALS * _OVERLAP
 #: Doubles that `separate_bodies` works in.
-SEPARATING = CLEARING + MAX_PLANES * PLANE
+SEPARATING = CLEARING + MAX_PLANES * PLANE + SHORTER
 
 
 class PosedParts(NamedTuple):
@@ -66,6 +68,15 @@ class PosedParts(NamedTuple):
     numbers: Any
     poses: Any
     shape_of: Any
+
+
+class _Bodies(NamedTuple):
+    """The first part and the number of parts of both bodies."""
+
+    first_a: int
+    n_a: int
+    first_b: int
+    n_b: int
 
 
 class PairSize(NamedTuple):
@@ -201,14 +212,16 @@ def separate_bodies(score, at, out_at, parts, first_a, n_a, first_b, n_b, work_a
     if size.has_halfspace:
         n_planes = gather_planes(parts, first_a, n_a, first_b, n_b, planes)
     shortest = way_out(planes, n_planes, True)
+    first_between = 0
     if n_planes < 0:
         n_directions = 0  # two half-spaces overlap without end
     else:
-        n_directions = n_overlaps + _N_AXES + (2 if n_planes > 0 else 0)
+        first_between = n_overlaps + _N_AXES + (2 if n_planes > 0 else 0)
+        n_directions = first_between + _N_BETWEEN
         upper = min(upper, -shortest.least)
         doubles[UPPER] = upper
-    best = Length(math.inf, math.inf)
-    overlap_number = 0
+    best, bodies = Length(math.inf, math.inf), _Bodies(first_a, n_a, first_b, n_b)
+    overlap_number, is_new = 0, False
     nhat = vec3_at(doubles, NORMAL)
     deepest = score[at + _DEEPEST + _DISTANCE]
     for k in range(n_directions):
@@ -217,6 +230,8 @@ def separate_bodies(score, at, out_at, parts, first_a, n_a, first_b, n_b, work_a
             break  # no translation is shorter than −upper
         if k < n_overlaps:
             n = vec3_at(score, at + _DEEPEST + _OVERLAP * k + _VECTORS)
+        elif k >= first_between:
+            n = _between_axes(score, at, parts, first_a, first_b, k - first_between)
         elif k < n_overlaps + _N_AXES:
             n = _axis(score, at, parts, first_a, first_b, k - n_overlaps)
         else:
@@ -224,13 +239,13 @@ def separate_bodies(score, at, out_at, parts, first_a, n_a, first_b, n_b, work_a
             if not norm(n) > 0.0:
                 continue
             n = scale(1.0 / norm(n), n)
-        length = _way_past_overlaps(score, at, parts, first_a, first_b, n, best.proven, work_at)
+        length = _length_along(score, at, parts, bodies, n, best.proven, work_at)
         if length.proven < best.proven:
-            length = clearing_length(parts, first_a, n_a, first_b, n_b, n, length, best.proven, work_at)
-        if length.proven < best.proven:
-            best = length
+            best, nhat, is_new = length, n, True
             overlap_number = k if k < n_overlaps else 0
-            nhat = n
+        if is_new and not tied and best.proven + upper > promised:
+            best, nhat = _shortened(score, at, parts, bodies, best, nhat, work_at)
+            is_new = False
     doubles[DISTANCE] = min(-best.value, upper)
     doubles[LOWER] = -best.proven * (1 + 2.0**-50)  # the normal is a unit vector but for rounding
     if best.proven < math.inf:
@@ -248,6 +263,30 @@ def separate_bodies(score, at, out_at, parts, first_a, n_a, first_b, n_b, work_a
 
 
 @kernel
+def _length_along(score, at, parts, bodies, n, limit, work_at):
+    """The `Length` along n that clears the union; infinite if not less than the limit."""
+    length = _way_past_overlaps(score, at, parts, bodies.first_a, bodies.first_b, n, limit, work_at)
+    if not length.proven < limit:
+        return Length(math.inf, math.inf)
+    return clearing_length(
+        parts, bodies.first_a, bodies.n_a, bodies.first_b, bodies.n_b, n, length, limit, work_at
+    )
+
+
+@kernel
+def _shortened(score, at, parts, bodies, best, n, work_at):
+    """(`Length`, direction) of a way out no longer than the way given, found from there on."""
+    planes_at = work_at + 8 * (CLEARING + MAX_PLANES * PLANE)
+    way = shorter_way(
+        parts, bodies.first_a, bodies.n_a, bodies.first_b, bodies.n_b, n, best.proven, planes_at, work_at
+    )
+    length = _length_along(score, at, parts, bodies, way, best.proven, work_at)
+    if length.proven < best.proven:
+        return length, way
+    return best, n
+
+
+@kernel
 def _way_past_overlaps(score, at, parts, first_a, first_b, n, limit, work_at):
     """The `Length` along n up to which the kept overlaps bar the way, or a single overlap does beyond the limit."""
     length = Length(0.0, 0.0)
@@ -262,15 +301,26 @@ def _way_past_overlaps(score, at, parts, first_a, first_b, n, limit, work_at):
 
 @kernel
 def _axis(score, at, parts, first_a, first_b, k):
-    """Direction k of _N_AXES: along the frames of the deepest overlap's parts, both ways; of swapped bodies the same
-    against it."""
+    """Direction k of _N_AXES: along the frame of the deepest overlap's first part, both ways; of swapped bodies the
+    opposite direction."""
     pa = first_a + int(score[at + _DEEPEST + _OF_A])
     pb = first_b + int(score[at + _DEEPEST + _OF_B])
-    _, pa, _, pb, flip = in_order(parts.ints, parts.poses, parts.shape_of[pa], pa, parts.shape_of[pb], pb)
-    at_pose = POSE * (pa if k < 6 else pb) + k % 3
+    _, pa, _, _, flip = in_order(parts.ints, parts.poses, parts.shape_of[pa], pa, parts.shape_of[pb], pb)
+    at_pose = POSE * pa + k % 3
     axis = Vec3(parts.poses[at_pose], parts.poses[at_pose + 3], parts.poses[at_pose + 6])
     axis = scale(1.0 / norm(axis), axis)
-    return neg(axis) if (k % 6 < 3) == flip else axis
+    return neg(axis) if (k < 3) == flip else axis
+
+
+@kernel
+def _between_axes(score, at, parts, first_a, first_b, k):
+    """Direction k of _N_BETWEEN, one in each octant of the first frame, off what may be planes of symmetry."""
+    p = _axis(score, at, parts, first_a, first_b, 0)
+    q = _axis(score, at, parts, first_a, first_b, 1)
+    r = _axis(score, at, parts, first_a, first_b, 2)
+    u, v, w = _OFF_AXES.x, _OFF_AXES.y, _OFF_AXES.z
+    n = add(scale(u if k & 1 else -u, p), add(scale(v if k & 2 else -v, q), scale(w if k & 4 else -w, r)))
+    return scale(1.0 / norm(n), n)
 
 
 @kernel(inline=True)

@@ -21,7 +21,7 @@ from collide.numerics.vec3 import Vec3, add, cross, dot, neg, norm, put_vec3, sc
 #: Half-spaces that are taken into account, those into which a body reaches deepest; the others are left to the proof.
 MAX_PLANES = 16
 #: Of a plane: its normal, towards which B is to go; how deep the bodies overlap along it, and how far off that is [m].
-_DEPTH, _ERROR, PLANE = 3, 4, 5
+DEPTH, ERROR, PLANE = 3, 4, 5
 #: Inequalities of depths of 1 hold but for this part of a translation.
 _SLACK = 2.0**-40
 #: Normals whose cross product, or determinant, is below this have no common solution that doubles tell.
@@ -83,13 +83,13 @@ def _put_plane(planes, n, m, depth, error):
     if n == MAX_PLANES:
         at = 0
         for k in range(1, n):
-            if planes[PLANE * k + _DEPTH] < planes[PLANE * at + _DEPTH]:
+            if planes[PLANE * k + DEPTH] < planes[PLANE * at + DEPTH]:
                 at = k
-        if not depth > planes[PLANE * at + _DEPTH]:
+        if not depth > planes[PLANE * at + DEPTH]:
             return n
     put_vec3(planes, PLANE * at, m)
-    planes[PLANE * at + _DEPTH] = depth
-    planes[PLANE * at + _ERROR] = error
+    planes[PLANE * at + DEPTH] = depth
+    planes[PLANE * at + ERROR] = error
     return max(n, at + 1)
 
 
@@ -124,7 +124,7 @@ class _Solution(NamedTuple):
 def _depth(planes, k, with_depths):
     """How far B is to go along a plane's normal [m]: the depth and twice the error, so that planes prove B clear; 1
     without depths."""
-    return planes[PLANE * k + _DEPTH] + 2.0 * planes[PLANE * k + _ERROR] if with_depths else 1.0
+    return planes[PLANE * k + DEPTH] + 2.0 * planes[PLANE * k + ERROR] if with_depths else 1.0
 
 
 @kernel
@@ -161,9 +161,9 @@ def _least(planes, of, p, q, r):
     if not length > 0.0:
         return 0.0
     # Normals are off by 2⁻⁴⁹ and move a depth by that much of what a body reaches beyond the plane: within its error.
-    reached = p * (planes[at_i + _DEPTH] - 2.0 * planes[at_i + _ERROR])
-    reached += q * (planes[at_j + _DEPTH] - 2.0 * planes[at_j + _ERROR])
-    reached += r * (planes[at_k + _DEPTH] - 2.0 * planes[at_k + _ERROR])
+    reached = p * (planes[at_i + DEPTH] - 2.0 * planes[at_i + ERROR])
+    reached += q * (planes[at_j + DEPTH] - 2.0 * planes[at_j + ERROR])
+    reached += r * (planes[at_k + DEPTH] - 2.0 * planes[at_k + ERROR])
     # Of the sum, 2⁻⁴⁸ of its terms may be rounding: they are longer than it by (p + q + r) / length.
     return max(reached / length * (1.0 - 2.0**-44 * (p + q + r) / length), 0.0)
 
@@ -173,7 +173,7 @@ def _clears(planes, n, x, with_depths):
     """Whether a translation clears all planes, but for half an error of their depths."""
     length = norm(x)
     for k in range(n):
-        slack = 0.5 * planes[PLANE * k + _ERROR] if with_depths else _SLACK * length
+        slack = 0.5 * planes[PLANE * k + ERROR] if with_depths else _SLACK * length
         if dot(vec3_at(planes, PLANE * k), x) < _depth(planes, k, with_depths) - slack:
             return False
     return True

@@ -1,0 +1,48 @@
+"""Depths of bodies that are not convex, made as short as is asked for."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from collide.base import argument_checks as checks
+from collide.errors import InvalidArgument
+from collide.lowering.parts import is_single_convex
+from collide.narrowphase.composite.composite_parts import compound_parts
+from collide.narrowphase.composite.least_depth import Depth, least_depth
+from collide.pairs.pair_arguments import pose_at, shape_at
+from collide.results import flipped
+from collide.shapes.shape import Shape
+
+_DEPTHS = {"quick": False, "least": True}
+
+
+def checked_depth(depth: Any) -> bool:
+    """Whether the least depth is asked for. Raises InvalidArgument."""
+    if not isinstance(depth, str) or depth not in _DEPTHS:
+        raise InvalidArgument(f'depth must be "quick" or "least", got {checks.brief(depth)}')
+    return _DEPTHS[depth]
+
+
+def shorten_depths(rows: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray) -> None:
+    """Make depths of rows (n,) of overlapping unions the least ones known, in place; shapes and poses as of `distance`.
+    """
+    for k in np.flatnonzero((rows["upper"] < 0.0) & np.isfinite(rows["lower"])).tolist():
+        shapes = shape_at(A, k), shape_at(B, k)
+        if not any(shape.meshed for shape in shapes) and not all(map(is_single_convex, shapes)):
+            rows[k : k + 1] = _shortened(rows[k : k + 1], *shapes, pose_at(X_WA, k), pose_at(X_WB, k))
+
+
+def _shortened(row: np.ndarray, A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
+    """A row (1,) with the least depth known; of swapped bodies the same, flipped."""
+    if (compound_parts(B).key, X_WB.tolist()) < (compound_parts(A).key, X_WA.tolist()):
+        return flipped(_shortened(flipped(row), B, A, X_WB, X_WA))
+    row = row.copy()
+    distance, lower, upper = (float(row[name][0]) for name in ("distance", "lower", "upper"))
+    depth = least_depth(A, B, X_WA, X_WB, Depth(-distance, -lower, row["normal"][0].copy(), -upper))
+    row["upper"], row["lower"] = -depth.least, -depth.proven
+    row["distance"], row["normal"] = min(-depth.length, -depth.least), depth.normal + 0.0
+    middle, half = 0.5 * (row["point_a"] + row["point_b"]), 0.5 * row["distance"] * row["normal"]
+    row["point_a"], row["point_b"] = middle - half, middle + half
+    return row
