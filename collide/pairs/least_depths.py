@@ -7,14 +7,15 @@ from typing import Any
 import numpy as np
 
 from collide.base import argument_checks as checks
+from collide.base.lazy_modules import lazy_module
 from collide.errors import InvalidArgument
 from collide.lowering.parts import is_single_convex
-from collide.narrowphase.composite.composite_parts import compound_parts
-from collide.narrowphase.composite.least_depth import Depth, least_depth
 from collide.pairs.pair_arguments import pose_at, shape_at
 from collide.results import flipped
 from collide.shapes.shape import Shape
 
+#: Loaded when a least depth is first asked for.
+least = lazy_module("collide.narrowphase.composite.least_depth")
 _DEPTHS = {"quick": False, "least": True}
 
 
@@ -36,11 +37,11 @@ def shorten_depths(rows: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray) -
 
 def _shortened(row: np.ndarray, A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
     """A row (1,) with the least depth known; of swapped bodies the same, flipped."""
-    if (compound_parts(B).key, X_WB.tolist()) < (compound_parts(A).key, X_WA.tolist()):
+    if (least.key_of(B), X_WB.tolist()) < (least.key_of(A), X_WA.tolist()):
         return flipped(_shortened(flipped(row), B, A, X_WB, X_WA))
     row = row.copy()
     distance, lower, upper = (float(row[name][0]) for name in ("distance", "lower", "upper"))
-    depth = least_depth(A, B, X_WA, X_WB, Depth(-distance, -lower, row["normal"][0].copy(), -upper))
+    depth = least.least_depth(A, B, X_WA, X_WB, least.Depth(-distance, -lower, row["normal"][0].copy(), -upper))
     row["upper"], row["lower"] = -depth.least, -depth.proven
     row["distance"], row["normal"] = min(-depth.length, -depth.least), depth.normal + 0.0
     middle, half = 0.5 * (row["point_a"] + row["point_b"]), 0.5 * row["distance"] * row["normal"]

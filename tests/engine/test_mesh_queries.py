@@ -137,7 +137,7 @@ def test_distances_are_bracketed_and_overlaps_come_apart():
             assert np.abs(r.point_b - r.point_a - r.distance * r.normal).max() < 1e-13
             if r.hit:
                 depths += 1
-                assert truth(A, B, X, Y) and r.distance <= 0.0 and (r.upper == 0.0 or r.how == 0)
+                assert truth(A, B, X, Y) and r.distance <= 0.0 and (r.upper <= 0.0 or r.how == 0)
                 apart = Y.copy()
                 apart[:3, 3] -= r.lower * r.normal * (1 + 1e-9) - 1e-12 * r.normal
                 assert not truth(A, B, X, apart), snippet(A, B, X, Y)

@@ -59,6 +59,11 @@ def least_depth(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, known: D
     return known if pairs.unbounded or not known.least < known.proven * (1.0 - TOLERANCE) else pairs.searched(known)
 
 
+def key_of(shape: Shape) -> bytes:
+    """Orders the bodies of a pair, so that swapped questions are worked out on the same numbers."""
+    return b"".join(part.content + (X + 0.0).tobytes() for part, X in parts_of(shape))
+
+
 class _Pairs:
     """The pairs of parts of two posed bodies that may bar a way no longer than the shortest known."""
 

@@ -19,9 +19,11 @@ from collide.kernels import address_of, code_of
 from collide.kernels.prepared import prepared_boolean, prepared_row
 from collide.lowering.facet_bodies import Body, hull_of, reach_of
 from collide.mesh.bvh_slabs import make_slabs
+from collide.narrowphase.bounds import PROMISE_STORED
 from collide.narrowphase.convex_batches import convex_rows
 from collide.narrowphase.convex_kernel_calls import number_of_poses
 from collide.narrowphase.facets import surface_collision, surface_distance, winding_numbers
+from collide.narrowphase.facets.ball_depths import ball_depth
 from collide.narrowphase.facets.exact_triangles import decide_exactly
 from collide.narrowphase.facets.facet_queries import (
     HEAP,
@@ -51,7 +53,7 @@ from collide.narrowphase.facets.mesh_distance_kernel import (
     gap_poses,
     gap_single,
 )
-from collide.narrowphase.facets.separating_translation import separating_translation, write_depth
+from collide.narrowphase.facets.separating_translation import separating_translation, translation_to, write_depth
 from collide.narrowphase.prepared_pairs import Prepared
 from collide.results import FORMULA, PAIR_DTYPE, UNDECIDED, flipped
 from collide.transforms import as_poses
@@ -312,9 +314,30 @@ def _completed_in_order(A: Body, B: Body, X_WA, X_WB, row: np.ndarray, lacks: in
     row["certified"] = decided = row["how"][0] != UNDECIDED
     row["upper"] = 0.0 if decided else max(float(row["upper"][0]), 0.0)
     row["beyond"] = False
+    ball = ball_depth(A, B, X_WA, X_WB) if decided else None
+    if ball is not None:
+        row["upper"] = -ball.least
+        moved = _moved(X_WB, ball.step)
+        if not hits(A, B, X_WA[None], moved[None])[0]:
+            translation = translation_to(moved, X_WB)
+            write_depth(row, point, translation._replace(length=min(ball.length, translation.length)))
+            row["certified"] = translation.bound - ball.least <= PROMISE_STORED * _size_of(A, B, X_WA, X_WB)
+            return row
     hulls = hull_rows(A, B, X_WA[None], X_WB[None], math.inf)[0]
     write_depth(row, point, separating_translation(A, B, X_WA, X_WB, hulls, steps, hits))
     return row
+
+
+def _moved(X: np.ndarray, step: np.ndarray) -> np.ndarray:
+    moved = X.copy()
+    moved[:3, 3] += step
+    return moved
+
+
+def _size_of(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray) -> float:
+    """How large a pair of bodies is [m]."""
+    x, y, z = X_WB[:3, 3] - X_WA[:3, 3]
+    return (reach_of(A) + reach_of(B)) + math.sqrt(x * x + y * y + z * z)
 
 
 def _far_gap(A: Body, B: Body, X_WA, X_WB, limit: float) -> np.ndarray:
@@ -331,8 +354,7 @@ def _far_gap(A: Body, B: Body, X_WA, X_WB, limit: float) -> np.ndarray:
             row["normal"] = (q - p) / length if length > 0.0 else (0.0, 0.0, 1.0)
             row["lower"], row["distance"] = 0.0, row["upper"]
             row["point_a"], row["point_b"] = p + A.radius * row["normal"], q - B.radius * row["normal"]
-        x, y, z = X_WB[:3, 3] - X_WA[:3, 3]
-        size = (reach_of(A) + reach_of(B)) + math.sqrt(x * x + y * y + z * z)
+        size = _size_of(A, B, X_WA, X_WB)
         row["certified"] = bool(row["lower"][0] > 0.0 and row["upper"][0] <= row["lower"][0] + PROMISE * size)
     row["hit"], row["how"] = False, FORMULA
     return row

@@ -56,6 +56,13 @@ def separating_translation(
     return shortened(lambda X, Y: hits(A, B, X, Y), X_WA, X_WB, known, directions, candidates)
 
 
+def translation_to(moved: np.ndarray, X_WB: np.ndarray) -> SeparatingTranslation:
+    """The translation from a pose (4, 4) to a moved pose, as the doubles of both are; the moved pose separates."""
+    step = moved[:3, 3] - X_WB[:3, 3]
+    length, bound = _length(step)
+    return SeparatingTranslation(length, bound, step / length)
+
+
 def write_depth(row: np.ndarray, point: np.ndarray, translation: SeparatingTranslation) -> None:
     """Make the depth of a row of meeting bodies a translation's length, in place; point: a common point (3,)."""
     length, bound, normal = translation
