@@ -25,9 +25,9 @@ class Shape:
 
     __slots__ = (
         "__weakref__", "_as_solid", "_bounds", "_convex_parts", "_crossings", "_facet_edges",
-        "_hulls_instead", "_items", "_kind", "_laid_out", "_leaves", "_link_spheres", "_meshed_leaves", "_partners",
-        "_parts", "_pieces", "_prepared", "_ray_way", "_reach", "_serial", "_single_facets", "_sphere_rows", "_surface",
-        "_topology", "_union", "_vertex_set", "_walk",
+        "_hulls_instead", "_inner_balls", "_items", "_kind", "_laid_out", "_leaves", "_link_spheres", "_meshed_leaves",
+        "_partners", "_parts", "_pieces", "_prepared", "_ray_way", "_reach", "_serial", "_single_facets",
+        "_sphere_rows", "_surface", "_topology", "_union", "_vertex_set", "_walk",
     )
     _fields: tuple[str, ...] = ()
     #: Convex parts, and sets that hold them (`lowering/parts.py`).
@@ -59,6 +59,8 @@ class Shape:
     _topology: Any
     #: Its parts, as unions with meshes ask about them (`narrowphase/composite/composite_parts.py`).
     _union: Any
+    #: Balls within a solid, for least depths (`narrowphase/facets/inner_balls.py`).
+    _inner_balls: Any
     #: Its parts in the rows that kernels of compounds read (`lowering/compound_layout.py`).
     _laid_out: Any
     #: Meshes and convex shapes that it is made of, with their trees (`motion/surface_motions.py`).

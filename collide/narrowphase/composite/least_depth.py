@@ -27,6 +27,7 @@ from collide.lowering.parts import parts_of
 from collide.lowering.shape_table import PoseTable, ShapeTable, pose_table
 from collide.narrowphase.composite.tried_ways import TRYING, WAY, shorten_ways, spans_along
 from collide.narrowphase.convex_kernel_calls import run_pairs
+from collide.narrowphase.known_depth import Depth
 from collide.results import UNDECIDED
 from collide.shapes.shape import Shape
 
@@ -41,16 +42,6 @@ _LAYERS, _FOLLOWED = 6, 4
 _WITHIN, _NEAREST, _FARTHEST = 2.0**-20, 2.0**-10, 4.0
 #: How far the cones asked about reach beyond the cones, as an angle; more where a moved pose's rounding is more.
 _WIDER, _WIDEST = 2.0**-30, 2.0**-20
-
-
-class Depth(NamedTuple):
-    """length : of a translation as computed.   proven : upper bound of its length.   normal : (3,) its direction.
-    least : proven lower bound of the length of every translation that parts the bodies [m]."""
-
-    length: float
-    proven: float
-    normal: np.ndarray
-    least: float
 
 
 def least_depth(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, known: Depth) -> Depth:

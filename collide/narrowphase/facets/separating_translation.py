@@ -59,7 +59,7 @@ def separating_translation(
 def translation_to(moved: np.ndarray, X_WB: np.ndarray) -> SeparatingTranslation:
     """The translation from a pose (4, 4) to a moved pose, as the doubles of both are; the moved pose separates."""
     step = moved[:3, 3] - X_WB[:3, 3]
-    length, bound = _length(step)
+    length, bound = length_of_step(step)
     return SeparatingTranslation(length, bound, step / length)
 
 
@@ -84,9 +84,9 @@ def shortened(
     def try_shorter(steps: np.ndarray) -> np.ndarray | None:
         """The shortest separating step of (n, 3), now the best, if shorter than the best so far; else ``None``."""
         nonlocal best, bound
-        shortest = _shortest_separating(meet, X_WA, X_WB, steps, best)
+        shortest = shortest_separating(meet, X_WA, X_WB, steps, best)
         if shortest is not None:
-            best, bound = _length(shortest)
+            best, bound = length_of_step(shortest)
         return shortest
 
     longest = bound
@@ -109,7 +109,7 @@ def shortened(
     return SeparatingTranslation(best, bound, normal)
 
 
-def _shortest_separating(meet: Callable, X_WA, X_WB, steps: np.ndarray, below: float) -> np.ndarray | None:
+def shortest_separating(meet: Callable, X_WA, X_WB, steps: np.ndarray, below: float) -> np.ndarray | None:
     """The shortest of the translations (n, 3) that separates the bodies and is shorter than ``below`` [m], as the
     rounded pose really moves B; ``None`` where no translation does.
 
@@ -134,7 +134,7 @@ def _shortest_separating(meet: Callable, X_WA, X_WB, steps: np.ndarray, below: f
     return None
 
 
-def _length(step: np.ndarray) -> tuple[float, float]:
+def length_of_step(step: np.ndarray) -> tuple[float, float]:
     """(length, proven upper bound) of a difference of doubles, each coordinate rounded once."""
     length = float(np.sqrt(np.square(step).sum()))
     return length, length * _UP + 5e-324
