@@ -135,6 +135,27 @@ def test_a_row_moves_the_camera_and_unfolds_its_numbers(page, workcell):
     assert link(page) == f"#pair={row['a']}|{row['b']}"
 
 
+def test_an_overlap_between_two_depths_is_not_called_open(page):
+    """Of bodies that are not convex: colliding, at most so deep, at least so deep. Only an undecided row is open."""
+    known = {"certified": False, "lower": -0.5, "how": "exact arithmetic"}
+    rows = [
+        pair("first", "second", -0.5, (1, 0, 0)) | known | {"upper": -0.125},
+        pair("first", "third", -0.5, (1, 0, 0)) | known | {"upper": 0.0},
+        pair("second", "third", -1e-9, (1, 0, 0)) | known | {"upper": 1e-9, "lower": -1e-9, "how": "undecided"},
+    ]
+    bodies = [body(name, (x, 0, 0), "colliding") for x, name in enumerate(("first", "second", "third"))]
+    place = page.write(
+        "depths", report=report_of("depths", colliding=rows), drawing=drawing_of([box(1.0)], bodies)
+    )
+    details = []
+    for a, b in (("first", "second"), ("first", "third"), ("second", "third")):
+        page.open(place, f"#pair={a}|{b}")
+        details.append(page.texts("#tables .detail")[0])
+    assert "at most 500.000 mm deep, at least 125.000 mm deep" in details[0] and "open" not in details[0]
+    assert "at most 500.000 mm deep, at least 0.000 mm deep" in details[1] and "open" not in details[1]
+    assert "the sign is open" in details[2] and "at most" not in details[2]
+
+
 def test_the_picture_shows_the_pair(page):
     """Pixels: ghosts are paler than bodies, and the move that parts the pair is drawn in its own colour."""
     place = small(page, "pixels")

@@ -90,11 +90,20 @@ function knownFacts(row, model, state) {
     facts.push(["decided by", sentence ? `${row.how}: ${sentence}` : row.how]);
   }
   if (row.certified === true) facts.push(["certified", "the sign is proven and the bracket is as narrow as promised"]);
-  if (row.certified === false) facts.push(["not certified", "the sign is open, or the bracket wider than promised"]);
+  if (row.certified === false) facts.push(uncertifiedFact(row));
   for (const name of row.approximated ?? []) {
     facts.push(["≈", element("span", {}, wholeName(name), " stands for another shape: the answer holds for what stands in")]);
   }
   return facts;
+}
+
+/** What is known of a row without the promised bracket: an open sign, an overlap between two depths, or a wide gap. */
+function uncertifiedFact(row) {
+  if (row.how === "undecided") return ["not certified", "the sign is open: touching within rounding"];
+  if (typeof row.lower === "number" && row.lower < 0 && row.upper <= 0) {
+    return ["colliding", `at most ${columnLength(-row.lower)} deep, at least ${columnLength(-row.upper)} deep, all three proven`];
+  }
+  return ["not certified", "the sign is proven, the bracket wider than promised"];
 }
 
 function contactFacts(contacts) {
