@@ -175,6 +175,7 @@ def test_no_hull_is_made_where_nothing_is_open():
     for other in (meshed(points), collide.Sphere(0.3), collide.Cylinder(0.3, 1)):
         assert collide.collide(mesh, other, np.eye(4), near) and not collide.collide(mesh, other, np.eye(4), far)
         assert collide.distance(mesh, other, np.eye(4), far).lower > 0.0
-    assert not hasattr(mesh, "_hull")
     assert collide.distance(mesh, collide.Sphere(0.3), np.eye(4), near).hit
-    assert hasattr(mesh, "_hull")  # a depth begins with it
+    assert not hasattr(mesh, "_hull")  # a ball is as deep as the surface is far
+    assert collide.distance(mesh, meshed(points), np.eye(4), near).hit
+    assert hasattr(mesh, "_hull")  # any other depth begins with it
