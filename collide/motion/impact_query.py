@@ -302,19 +302,20 @@ def _answer(question: _Question) -> np.ndarray:
     return rows
 
 
-def _shapes_of(question: _Question, some: np.ndarray) -> list:
+def _shapes_of(question: _Question, some: np.ndarray) -> tuple:
     """Shapes A and B of motions, as batches take them."""
     sides = []
     for which in (question.a[some], question.b[some]):
         same = len(which) and (which == which[0]).all()
         sides.append(question.shapes[which[0]] if same else [question.shapes[k] for k in which.tolist()])
-    return sides
+    return sides[0], sides[1]
 
 
 def _start_of(question: _Question, some: np.ndarray):
     """(A, B, X_WA, X_WB) of motions at their start."""
     picked = question.motions.picked(some)
-    return *_shapes_of(question, some), picked.X_WA0, picked.X_WB0
+    A, B = _shapes_of(question, some)
+    return A, B, picked.X_WA0, picked.X_WB0
 
 
 def _ask_end(question: _Question, rows: np.ndarray) -> None:
@@ -326,8 +327,8 @@ def _ask_end(question: _Question, rows: np.ndarray) -> None:
     picked = question.motions.picked(some)
     if not len(some) or picked.omega_WA is not None or picked.omega_WB is not None:
         return
-    poses = picked.X_WA1, picked.X_WB1
-    pairs = answer_batch(*_shapes_of(question, some), *poses, Question(False, np.inf, False), question.threads)
+    A, B = _shapes_of(question, some)
+    pairs = answer_batch(A, B, picked.X_WA1, picked.X_WB1, Question(False, np.inf, False), question.threads)
     pairs = np.broadcast_to(pairs, len(some))
     touching = some[pairs["hit"] & (pairs["how"] != UNDECIDED)]
     rows["upper"][touching], rows["status"][touching] = 1.0, CONTACT
