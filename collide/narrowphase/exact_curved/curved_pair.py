@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from math import isqrt
 from typing import NamedTuple
 
 from collide.narrowphase.exact_curved.corners_and_facets import common_point
@@ -14,6 +13,7 @@ from collide.narrowphase.exact_curved.integer_bodies import (
     Vector,
     WorldPoint,
     is_apart_along,
+    least_height,
     opposite,
     sign_of_overlap,
 )
@@ -54,7 +54,7 @@ def settle_pair(A: IntegerBody, B: IntegerBody, n: Vector, near: WorldPoint) -> 
     if point is None:
         for polytope, C, m in ((A, B, n), (B, A, opposite(n))):
             if isinstance(polytope, SweptPoints) and polytope.radius == 0 and isinstance(C, CurvedBody):
-                point = common_point(polytope, C, _first(C, m), m)
+                point = common_point(polytope, C, least_height(C, m), m)
                 if point is None:
                     return Decision(None, search(A, B, n).normal)
                 break
@@ -65,11 +65,6 @@ def settle_pair(A: IntegerBody, B: IntegerBody, n: Vector, near: WorldPoint) -> 
         if point is None:
             return Decision(None, normal, normal is None)
     return Decision(point, _touching_normal(A, B, normals, point))
-
-
-def _first(C: CurvedBody, n: Vector) -> int:
-    """A whole number at most n·x for all points of C."""
-    return min(-r.a - isqrt(r.b) - 1 for r in C.reaches(opposite(n)))
 
 
 def _candidates(A: IntegerBody, B: IntegerBody, near: WorldPoint) -> Iterable[WorldPoint]:

@@ -8,11 +8,11 @@ w > 0, for x/w, y/w, z/w.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from functools import cached_property
 from itertools import combinations
-from math import gcd
+from math import gcd, isqrt
 from typing import NamedTuple
 
 from collide.curved.shape_kinds import CONE, CYLINDER, ELLIPSOID
@@ -224,11 +224,16 @@ class CurvedBody:
 class SweptPoints:
     """The hull of points of the world (integers) swept by a ball.
 
-    radius : in units of the world.   triangles, edges : of the hull, by number.   solid : whether it has an inside.
+    radius : in units of the world.   triangles, edges : of the hull, by number.   solid : whether of three dimensions.
+    support : the largest n·x over all points, along n; ``points`` may be a part, near the opponent.
     """
 
-    def __init__(self, points: Sequence[Vector], radius: int, triangles: Sequence[Sequence[int]], edges, solid: bool):
+    def __init__(
+        self, points: Sequence[Vector], radius: int, triangles: Sequence[Sequence[int]], edges, solid: bool,
+        support: Callable[[Vector], int] | None = None,
+    ):
         self.points, self.radius, self.triangles, self.edges, self.solid = points, radius, triangles, edges, solid
+        self.support = support or (lambda n: max(inner(n, x) for x in points))
         self.discs: list[Disc] = []
 
     @property
@@ -237,7 +242,7 @@ class SweptPoints:
         return (*(sum(c) for c in zip(*self.points)), len(self.points))  # type: ignore[return-value]
 
     def reaches(self, n: Vector) -> list[Reach]:
-        return [Reach(max(inner(n, x) for x in self.points), self.radius**2 * inner(n, n))]
+        return [Reach(self.support(n), self.radius**2 * inner(n, n))]
 
     def holds(self, x: WorldPoint) -> bool:
         """Whether a point is at most the radius from the hull."""
@@ -362,6 +367,11 @@ def is_left_of(p: Sequence[int], w: int, start: Vector, end: Vector, normal: Vec
     """Whether p/w is to the left of an edge, or on it, seen against the normal."""
     x = p[0] - w * start[0], p[1] - w * start[1], p[2] - w * start[2]
     return inner(cross(minus(end, start), x), normal) >= 0
+
+
+def least_height(C: CurvedBody, n: Vector) -> int:
+    """A whole number at most n·x for all points of C."""
+    return min(-r.a - isqrt(r.b) - 1 for r in C.reaches(opposite(n)))
 
 
 def is_apart_along(A: IntegerBody, B: IntegerBody, n: Vector) -> bool:

@@ -33,14 +33,18 @@ from collide.narrowphase.exact_curved.integer_bodies import (
     SweptPoints,
     Units,
     Vector,
+    least_height,
     opposite,
     units_of,
     whole,
 )
 from collide.narrowphase.fallback_searches import lay_points_apart
+from collide.numerics.exact_vectors import inner
 from collide.results import EXACT
 
 _SIZES = {CYLINDER: 2, CONE: 2, ELLIPSOID: 3}
+#: So many points are taken without a look at which of them are near.
+_MAX_UNSORTED = 32
 
 
 def settle_curved(
@@ -58,9 +62,10 @@ def settle_curved(
         parts = [int(part) for part in pairs[k]]
         sets = [int(shape_of[part]) for part in parts]
         if _is_served(table, poses, sets, parts):
-            A, B, units = _integer_bodies(table, poses, sets, parts)
             row = rows[k : k + 1]
-            decision = settle_pair(A, B, _normal_of(row), _point_of(row, units))
+            n = _normal_of(row)
+            A, B, units = _integer_bodies(table, poses, sets, parts, n)
+            decision = settle_pair(A, B, n, _point_of(row, units))
             if not decision.is_open:
                 _write(row, decision, A, B, units, limit)
 
@@ -75,8 +80,9 @@ def _is_served(table, poses: PoseTable, sets: list[int], parts: list[int]) -> bo
 
 
 def _integer_bodies(
-    table, poses: PoseTable, sets: list[int], parts: list[int]
+    table, poses: PoseTable, sets: list[int], parts: list[int], n: Vector
 ) -> tuple[IntegerBody, IntegerBody, Units]:
+    """Bodies A and B in integers.   n : a direction from A to B, along which many points are sorted out."""
     entries = [poses.exact(part) for part in parts]
     points = [_points(table, s) if table.ints[s, KIND] == POINTS else None for s in sets]
     sizes = [
@@ -87,18 +93,58 @@ def _integer_bodies(
     lengths = [x for e in entries for x in e[9:]] + sizes[0] + sizes[1] + radii
     lengths += [Fraction(x) for p in points if p is not None for x in p.ravel().tolist()]
     units = units_of(lengths, [x for e in entries for x in e[:9]])
+    curved = {
+        k: CurvedBody(int(table.ints[s, KIND]), [whole(x, units.length) for x in sizes[k]], IntegerPose(e, units))
+        for k, (s, e) in enumerate(zip(sets, entries))
+        if points[k] is None
+    }
     bodies: list[IntegerBody] = []
-    for k, s in enumerate(sets):
-        pose = IntegerPose(entries[k], units)
-        corners = points[k]
+    for k, (m, corners) in enumerate(zip((n, opposite(n)), points)):
         if corners is None:
-            bodies.append(CurvedBody(int(table.ints[s, KIND]), [whole(x, units.length) for x in sizes[k]], pose))
+            bodies.append(curved[k])
         else:
-            placed = [pose.placed([whole(Fraction(x), units.length) for x in p])[:3] for p in corners.tolist()]
-            triangles, edges, solid = _topology(corners.tobytes())
             radius = whole(radii[k], units.length) << units.rotation
-            bodies.append(SweptPoints(placed, radius, triangles, edges, solid))
+            bodies.append(_swept_points(corners, radius, IntegerPose(entries[k], units), units, curved[1 - k], m))
     return bodies[0], bodies[1], units
+
+
+def _swept_points(
+    corners: np.ndarray, radius: int, pose: IntegerPose, units: Units, C: CurvedBody, n: Vector
+) -> SweptPoints:
+    """Points (m, 3) swept by a ball, in integers; of many, the points that can be near a curved set C along n.
+
+    All that the hull and C share has n·x + radius |n| ≥ h, the least n·x over C. The hull's part above h is within the
+    hull of the corners above h and their neighbours, since an edge crosses h between two of these.
+    """
+
+    def placed(k: int) -> Vector:
+        return pose.placed([whole(Fraction(x), units.length) for x in corners[k].tolist()])[:3]
+
+    if len(corners) <= _MAX_UNSORTED:
+        return SweptPoints([placed(k) for k in range(len(corners))], radius, *_topology(corners.tobytes()))
+    triangles = np.array(_topology(corners.tobytes())[0], dtype=np.int64).reshape(-1, 3)
+    scale = 2.0**-units.length
+    R = np.array([[float(Fraction(x, 1 << units.rotation)) for x in row] for row in pose.rows])
+    size = np.abs(corners).sum(axis=1).max() + 1e-300
+
+    def candidates(m: Vector, least: int | None) -> np.ndarray:
+        """Rows perhaps farthest along m, or as far as ``least``; doubles are off by 1e-14 of the size."""
+        length = max(max(abs(x) for x in m), 1)
+        heights = corners @ (R.T @ np.array([float(Fraction(x, length)) for x in m]))
+        limit = heights.max()
+        if least is not None:
+            at = least - inner(m, pose.p)
+            limit = min(limit, float(Fraction(at, length << units.rotation)) * scale)
+        return np.flatnonzero(heights >= limit - 1e-9 * size)
+
+    def support(m: Vector) -> int:
+        return max(inner(m, placed(int(k))) for k in candidates(m, None))
+
+    reach = radius * (isqrt(inner(n, n)) + 1)
+    near = candidates(n, least_height(C, n) - reach)
+    beside = triangles[np.isin(triangles, near).any(axis=1)] if len(triangles) else np.arange(len(corners))
+    taken = np.unique(np.concatenate([near, beside.ravel()]))
+    return SweptPoints([placed(int(k)) for k in taken], radius, *_topology(corners[taken].tobytes()), support)
 
 
 def _points(table, s: int) -> np.ndarray:
@@ -123,7 +169,7 @@ def _topology(points: bytes) -> tuple[list[list[int]], list[tuple[int, int]], bo
 
 def _normal_of(row: np.ndarray) -> Vector:
     """The row's normal, from A to B, as integers."""
-    return tuple(int(x) for x in np.rint(row["normal"][0] * 2.0**60).tolist())  # type: ignore[return-value]
+    return tuple(int(x) for x in np.rint(np.nan_to_num(row["normal"][0]) * 2.0**60).tolist())  # type: ignore[return-value]
 
 
 def _point_of(row: np.ndarray, units: Units) -> tuple[int, int, int, int]:

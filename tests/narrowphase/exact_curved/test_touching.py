@@ -104,3 +104,23 @@ def test_what_rests_on_a_half_space_touches(shape):
         assert r.hit == hit and r.how == collide.results.EXACT and r.certified
         assert r.lower <= r.distance <= r.upper and abs(r.distance - (height - 0.25)) <= 1e-15 * abs(height - 0.25)
         assert r.upper - r.lower <= 2.0**-50 * abs(r.distance)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_hulls_of_many_points_are_sorted_out_and_right(seed):
+    """Of 300 points those near the other body are looked at in integers; the answer is that of all."""
+    rng = np.random.default_rng([49, seed])
+    told = 0
+    for k in range(6):
+        points = rng.normal(size=(300, 3))
+        points = np.round(points / np.linalg.norm(points, axis=1)[:, None] * 2**16) / 2**16
+        A = collide.ConvexHull(points, radius=0.125 * (k % 2))
+        B = (collide.Cylinder(0.25, 0.5), collide.Cone(0.3, 0.6), collide.Ellipsoid((0.5, 0.5, 0.25)))[k % 3]
+        X_WB = collide.pose(3.0 * rng.normal(size=3), quat_wxyz=rng.normal(size=4))
+        r = collide.distance(A, B, np.eye(4), X_WB)
+        X_WB[:3, 3] -= r.distance * r.normal
+        pair = Pair(A, B, np.eye(4), X_WB, "many points")
+        r, known = answered(pair), bracket(A, B, np.eye(4), X_WB, depths=False)
+        assert known.hit in (None, r.hit), pair
+        told += known.hit is not None
+    assert told >= 4
