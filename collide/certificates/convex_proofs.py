@@ -11,12 +11,14 @@ from collide.certificates.certificate import VertexPair
 from collide.certificates.exact_parts import ExactPart, common_vertices
 from collide.certificates.nearest_to_origin import nearest_to_origin
 from collide.lowering.convex_sets import HALFSPACE, POINTS
-from collide.numerics.exact_points import Point, in_integers, opposite
+from collide.numerics.exact_points import in_integers, opposite
 from collide.numerics.exact_vectors import inner, minus
 
 
 def flaw_of_proof(A: ExactPart, B: ExactPart, pairs: Sequence[VertexPair], *, hit: bool) -> str | None:
     """Why vertex pairs fail to prove a hit (hit) or gap of A and B; ``None`` for a proof. O(vertices)."""
+    if not all(part.kind in (POINTS, HALFSPACE) for part in (A, B)):
+        return "vertices prove nothing of a cylinder, cone or ellipsoid"
     if HALFSPACE in (A.kind, B.kind):
         return flaw_of_plane_proof(A, B, pairs, hit=hit)
     if not 1 <= len(pairs) <= 4:
@@ -62,14 +64,3 @@ def flaw_of_plane_proof(A: ExactPart, B: ExactPart, pairs: Sequence[VertexPair],
         return "no vertex named reaches the half-space"
     lowest = points.first_along(in_integers(n))
     return None if is_clear(lowest) else f"vertex {lowest} reaches the half-space"
-
-
-def flaw_of_normal(A: ExactPart, B: ExactPart, normal: Point) -> str | None:
-    """Why a normal fails to prove that A lies beyond B along the normal; ``None`` for a proof. O(vertices)."""
-    if not (A.kind == B.kind == POINTS and A.radius == B.radius == 0):
-        return "a plane proves something of convex bodies of vertices without radii alone"
-    points_a, points_b, _ = common_vertices(A, B)
-    i, j = points_a.first_along(normal), points_b.first_along(opposite(normal))
-    if inner(normal, points_a[i]) > inner(normal, points_b[j]):
-        return None
-    return f"vertex {i} of A and vertex {j} of B are not on different sides of the plane"

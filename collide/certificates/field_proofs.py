@@ -329,7 +329,7 @@ def _away(items: SweptHulls, part: ExactPart) -> np.ndarray:
         return (items.facing(n) @ n).min(axis=1) - items.radii * np.linalg.norm(n)
     vertex = [float(Fraction(c) * Fraction(2) ** part.vertices.grid) for c in part.vertices[0]]
     centre = part.points_P.mean(axis=0) - part.points_P[0]
-    middle = (np.array(vertex) + part._poses[-1][:3, :3] @ centre - X[:3, 3]) @ X[:3, :3]
+    middle = (np.array(vertex) + part.poses[-1][:3, :3] @ centre - X[:3, 3]) @ X[:3, :3]
     low, high = items.points.min(axis=1), items.points.max(axis=1)
     return np.square(np.maximum(np.maximum(low - middle, middle - high), 0.0)).sum(axis=1)
 

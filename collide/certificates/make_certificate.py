@@ -1,4 +1,6 @@
-"""Certificates of results: the vertices decisive in doubles, or the last vertices of an exact search from them."""
+"""Certificates of results: the vertices decisive in doubles, or the last vertices of an exact search from them; planes
+and points of curved pairs, and planes between groups of facets.
+"""
 
 from __future__ import annotations
 
@@ -7,16 +9,20 @@ from fractions import Fraction
 
 import numpy as np
 
-from collide.certificates.certificate import APART, INSIDE, NO_VERTEX, PLANE, TOGETHER, Certificate, VertexPair
-from collide.certificates.convex_proofs import flaw_of_normal, flaw_of_proof
-from collide.certificates.exact_parts import ExactPart, common_vertices, exact_parts, has_exact_numbers
+from collide.certificates.body_groups import BodyGroups
+from collide.certificates.certificate import APART, INSIDE, NO_VERTEX, PLANE, POINT, TOGETHER, Certificate, VertexPair
+from collide.certificates.convex_proofs import flaw_of_proof
+from collide.certificates.exact_parts import ExactPart, common_vertices, exact_parts
 from collide.certificates.field_proofs import field_certificate
+from collide.certificates.group_search import meeting, parted
 from collide.certificates.mesh_proofs import ProofBody, flaw_of_inside_proof
 from collide.certificates.nearest_to_origin import nearest_vertex_pairs
+from collide.certificates.point_and_plane import flaw_of_normal
+from collide.certificates.proof_search import common_point, parting_normal
 from collide.certificates.region_proofs import RegionCertificate, make_region_certificate
 from collide.certificates.verify import check_question
 from collide.errors import InvalidArgument, brief
-from collide.lowering.convex_sets import HALFSPACE
+from collide.lowering.convex_sets import HALFSPACE, POINTS
 from collide.numerics.exact_points import in_integers
 from collide.results import UNDECIDED, PairResult, question_of_row
 from collide.transforms import as_poses
@@ -36,8 +42,8 @@ def certify(A, B, X_WA, X_WB, r: PairResult) -> Certificates | list[Certificates
 
     Returns
     -------
-    A tuple of `Certificate`, for each pair of parts in the proof; ``None`` for pairs without a certificate (curved
-    shapes, an open sign, beyond max_distance, …: `collide.certificates.certificate` lists them). A list of tuples for
+    A tuple of `Certificate`, for each pair of parts in the proof; ``None`` for pairs without a certificate (an
+    open sign, …: `collide.certificates.certificate` lists them). A list of tuples for
     batches.
 
     Raises
@@ -48,9 +54,11 @@ def certify(A, B, X_WA, X_WB, r: PairResult) -> Certificates | list[Certificates
     The vertices decisive in doubles are tried first, O(vertices) doubles; where they prove nothing exactly,
     Gilbert's, Johnson's and Keerthi's algorithm goes on from them, O(vertices) doubles a round: integers decide among
     the vertices possibly farthest by a proven bound of rounding. Meshes apart use the vertices of their hulls: O(n + m)
-    a round; meeting meshes two facets; a body inside the other, O(m) a connected part of the surface. Fields get
-    planes beside the nearest item not parted yet: O(items) doubles a plane. For unions apart every pair of parts has
-    a certificate: O(k l) searches for k and l parts.
+    a round; meeting meshes two facets; a body inside the other, O(m) a connected part of the surface. Meshes apart
+    whose hulls meet: a search for a plane, some 1 ms, for each pair of groups of facets looked at. Fields get planes
+    beside the nearest item not parted yet: O(items) doubles a plane. For unions apart every pair of parts has a
+    certificate: O(k l) searches for k and l parts. Of curved pairs the row's normal and points are tried first, then
+    the algebra of docs/curved-signs.md: up to some 0.1 s where bodies touch within rounding.
     """
     shapes_a, shapes_b = (S if isinstance(S, Sequence) else [S] for S in (A, B))
     check_question("certify", shapes_a, shapes_b, r)
@@ -68,28 +76,27 @@ def certify(A, B, X_WA, X_WB, r: PairResult) -> Certificates | list[Certificates
 
 def certificate_of_row(A, B, X_WA, X_WB, row) -> Certificates:
     """The certificate of a row of `distance` at poses (1, 4, 4); ``None`` for a pair without a certificate."""
-    if row["how"] == UNDECIDED or row["beyond"]:
+    if row["how"] == UNDECIDED:
         return None
     if A.is_field or B.is_field:
         return field_certificate(A, B, X_WA[0], X_WB[0], row)
     if A.is_region or B.is_region:
         return make_region_certificate(A, B, X_WA[0], X_WB[0])
     if A.meshed or B.meshed:
-        return _of_meshes(ProofBody(A, X_WA[0]), ProofBody(B, X_WB[0]), row)
+        return _of_meshes(ProofBody(A, X_WA[0]), ProofBody(B, X_WB[0]), row) or _of_groups(A, B, X_WA[0], X_WB[0], row)
     parts_a, parts_b = exact_parts(A, X_WA[0]), exact_parts(B, X_WB[0])
-    if all(any(part.kind == HALFSPACE for part in parts) for parts in (parts_a, parts_b)):
-        return None
-    if not all(has_exact_numbers(part) for part in (*parts_a, *parts_b)):
-        return None
     pairs = list(zip(row["vertices_a"].tolist(), row["vertices_b"].tolist()))[: row["count"]]
     i, j = decided = int(row["part_a"]), int(row["part_b"])
     if row["hit"]:
-        return (_of_parts(parts_a[i], parts_b[j], i, j, pairs, hit=True),)
-    return tuple(
-        _of_parts(part_a, part_b, i, j, pairs if (i, j) == decided else [(0, 0)], hit=False)
-        for i, part_a in enumerate(parts_a)
-        for j, part_b in enumerate(parts_b)
-    )
+        made = [_of_parts(parts_a[i], parts_b[j], i, j, pairs, row)]
+    else:
+        made = [
+            _of_parts(part_a, part_b, i, j, pairs if (i, j) == decided else [(0, 0)], row)
+            for i, part_a in enumerate(parts_a)
+            for j, part_b in enumerate(parts_b)
+        ]
+    certificates = tuple(certificate for certificate in made if certificate is not None)
+    return certificates if len(certificates) == len(made) else None
 
 
 def certificate_from_pairs(A, B, X_WA, X_WB, pairs: Sequence[VertexPair], *, hit: bool) -> tuple[Certificate, ...]:
@@ -98,7 +105,7 @@ def certificate_from_pairs(A, B, X_WA, X_WB, pairs: Sequence[VertexPair], *, hit
     pairs : one to four (vertex of A, vertex of B) near where the bodies meet, or are nearest each other.
     """
     (part_a,), (part_b,) = exact_parts(A, X_WA), exact_parts(B, X_WB)
-    return (_of_parts(part_a, part_b, 0, 0, list(pairs)[:4], hit=hit),)
+    return (_of_vertices(part_a, part_b, 0, 0, list(pairs)[:4], hit=hit),)
 
 
 def certificate_from_normal(A, B, X_WA, X_WB, normal: np.ndarray) -> tuple[Certificate, ...] | None:
@@ -112,7 +119,23 @@ def certificate_from_normal(A, B, X_WA, X_WB, normal: np.ndarray) -> tuple[Certi
     return (Certificate(PLANE, 0, 0, (whole,)),)
 
 
-def _of_parts(A: ExactPart, B: ExactPart, i: int, j: int, pairs: list[VertexPair], *, hit: bool) -> Certificate:
+def _of_parts(A: ExactPart, B: ExactPart, i: int, j: int, pairs: list[VertexPair], row) -> Certificate | None:
+    """The certificate of what a row says, about part i of A and part j of B; ``None`` where no proof is found."""
+    if POINTS in (A.kind, B.kind) and all(part.kind in (POINTS, HALFSPACE) for part in (A, B)):
+        return _of_vertices(A, B, i, j, pairs, hit=bool(row["hit"]))
+    if row["hit"]:
+        point = common_point(A, B, _points_of(row), [-row["normal"]])
+        return point and Certificate(POINT, i, j, (point,))
+    normal = parting_normal(A, B, [-row["normal"]])
+    return normal and Certificate(PLANE, i, j, (normal,))
+
+
+def _points_of(row) -> list[np.ndarray]:
+    """Points near both bodies, where a row has them: the middle of its points, and these."""
+    return [0.5 * (row["point_a"] + row["point_b"]), row["point_a"], row["point_b"]]
+
+
+def _of_vertices(A: ExactPart, B: ExactPart, i: int, j: int, pairs: list[VertexPair], *, hit: bool) -> Certificate:
     kind = TOGETHER if hit else APART
     if HALFSPACE in (A.kind, B.kind):
         return Certificate(kind, i, j, tuple(pairs[:1]))
@@ -137,6 +160,14 @@ def _of_meshes(A: ProofBody, B: ProofBody, row) -> Certificates:
     if HALFSPACE in (A.kind, B.kind):
         return _of_plane(A, B, bool(row["hit"]))
     return _together(A, B, row) if row["hit"] else _apart(A, B)
+
+
+def _of_groups(A, B, X_WA: np.ndarray, X_WB: np.ndarray, row) -> Certificates:
+    """Planes between groups of items, or a point that two items hold."""
+    a, b, normals = BodyGroups(A, X_WA), BodyGroups(B, X_WB), [-row["normal"]]
+    if row["hit"]:
+        return meeting(a, b, _points_of(row), normals, (int(row["part_a"]), int(row["part_b"])))
+    return parted(a, b, normals)
 
 
 def _of_plane(A: ProofBody, B: ProofBody, hit: bool) -> Certificates:

@@ -6,7 +6,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from collide.certificates.certificate import APART, INSIDE, NO_VERTEX, TOGETHER, Certificate, VertexPair
+from collide.certificates.body_groups import BodyGroups, Planes, flaw_of_meeting, flaw_of_outside, flaw_of_planes
+from collide.certificates.certificate import (
+    APART,
+    INSIDE,
+    NO_VERTEX,
+    PLANE,
+    POINT,
+    TOGETHER,
+    Certificate,
+    VertexPair,
+)
 from collide.certificates.convex_proofs import flaw_of_plane_proof, flaw_of_proof
 from collide.certificates.exact_parts import IDENTITY, ExactPart, exact_part, has_exact_numbers
 from collide.certificates.winding_number import winding_number_around
@@ -18,7 +28,7 @@ class ProofBody:
     """A mesh or a convex shape at a pose: its vertices by id, its facets.
 
     is_mesh : ``False`` for a convex shape, read as a single facet.
-    has_certificates : whether the body has exact numbers and is no union.
+    has_certificates : whether proofs by vertices are of the body: exact numbers, no union, no curved part.
     vertex_ids : ascending, of the vertices used by facets; ``None`` for a convex shape, where all are used.
     """
 
@@ -82,9 +92,17 @@ def flaw_of_mesh_certificates(A, B, X_WA, X_WB, certificates: Sequence[Certifica
 
     None where they do.
     """
+    kinds = {certificate.kind for certificate in certificates}
+    if claim == APART and kinds == {PLANE}:
+        planes: Planes = {(i, j): rows[0] for _, i, j, rows in certificates}
+        a, b = BodyGroups(A, X_WA), BodyGroups(B, X_WB)
+        return flaw_of_planes(a, b, planes) or flaw_of_outside(a, b)
+    if claim == TOGETHER and kinds == {POINT} and len(certificates) == 1:
+        ((_, i, j, (point,)),) = certificates
+        return flaw_of_meeting(BodyGroups(A, X_WA), BodyGroups(B, X_WB), i, j, point)
     body_a, body_b = ProofBody(A, X_WA), ProofBody(B, X_WB)
     if not (body_a.has_certificates and body_b.has_certificates):
-        return "these shapes have no certificates"
+        return "these shapes have certificates of planes, or of a point, alone"
     if len(certificates) != 1:
         return f"one certificate is needed, not {len(certificates)}"
     kind, facet_a, facet_b, pairs = certificates[0]

@@ -31,7 +31,7 @@ def nearest_to_origin(points: Sequence[Point]) -> NearestPoint:
     for count in range(1, len(points) + 1):
         for carrier in combinations(range(len(points)), count):
             corners = [points[k] for k in carrier]
-            weights = _weights(corners)
+            weights = weights_towards_origin(corners)
             if weights is None or any(w <= 0 for w in weights):
                 continue
             scale = sum(weights)
@@ -59,7 +59,7 @@ def nearest_vertex_pairs(A: PlacedPoints, B: PlacedPoints, pairs: Sequence[Verte
         simplex.append((i, j))
 
 
-def _weights(points: Sequence[Point]) -> list[int] | None:
+def weights_towards_origin(points: Sequence[Point]) -> list[int] | None:
     """Integer weights of the point of the affine hull nearest the origin; None for affinely dependent points."""
     base, edges = points[0], [minus(p, points[0]) for p in points[1:]]
     gram = [[inner(e, f) for f in edges] for e in edges]

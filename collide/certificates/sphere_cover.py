@@ -30,11 +30,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from collide.certificates.exact_parts import leaves_of
 from collide.certificates.winding_number import winding_number_around
 from collide.lowering.convex_sets import convex_set
 from collide.numerics.exact_points import PlacedPoints, Point, integers, leading_digits
 from collide.numerics.exact_vectors import cross, inner, minus
-from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
 from collide.shapes.primitives import Cone, Cylinder, Ellipsoid, Sphere
 from collide.shapes.shape import Shape
@@ -77,15 +77,6 @@ class _Balls(NamedTuple):
         return _Balls(
             [(x << shift, y << shift, z << shift) for x, y, z in self.centers], [r << shift for r in self.radii], grid
         )
-
-
-def leaves_of(shape: Shape, poses: tuple[np.ndarray, ...] = ()) -> Iterator[tuple[Shape, tuple[np.ndarray, ...]]]:
-    """The parts of a body in their order, each with the poses (4, 4) to be applied, the first pose first."""
-    if isinstance(shape, Compound):
-        for item, X in shape.items:
-            yield from leaves_of(item, (X, *poses))
-    else:
-        yield shape, poses
 
 
 def flaw_of_cover(shape: Shape, centers: np.ndarray, radii: np.ndarray, covers: Sequence[PartCover]) -> str | None:

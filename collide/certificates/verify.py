@@ -7,15 +7,27 @@ from collections.abc import Sequence
 import numpy as np
 
 from collide.base import argument_checks as checks
-from collide.certificates.certificate import APART, PLANE, TOGETHER, Certificate, CertificateRefused, read_certificates
-from collide.certificates.convex_proofs import flaw_of_normal, flaw_of_proof
+from collide.certificates.certificate import (
+    APART,
+    PLANE,
+    POINT,
+    TOGETHER,
+    Certificate,
+    CertificateRefused,
+    read_certificates,
+)
+from collide.certificates.convex_proofs import flaw_of_proof
 from collide.certificates.exact_parts import exact_parts
 from collide.certificates.field_proofs import flaw_of_field_certificates
 from collide.certificates.mesh_proofs import flaw_of_mesh_certificates
+from collide.certificates.point_and_plane import flaw_of_normal, flaw_of_point
 from collide.certificates.region_proofs import flaw_of_region_certificate
 from collide.errors import InvalidArgument
 from collide.shapes.shape import checked_shape
 from collide.transforms import as_poses
+
+#: Kinds of certificates that prove a claim about convex parts.
+_PROOFS = {APART: (APART, PLANE), TOGETHER: (TOGETHER, POINT)}
 
 
 def verify(A, B, X_WA, X_WB, r, *, certificate=None) -> None:
@@ -42,7 +54,8 @@ def verify(A, B, X_WA, X_WB, r, *, certificate=None) -> None:
     InvalidPose : poses other than (4, 4) matrices of finite numbers.
 
     O(vertices) doubles a pair of parts, and integers for vertices left in doubt; O(facets) where a
-    body lies inside a solid mesh; O(items) doubles a plane beside fields, of terrain O(heights) once and boxes around
+    body lies inside a solid mesh; O(vertices of two groups) doubles a plane between meshes, O(facets) a surface outside
+    a solid; O(items) doubles a plane beside fields, of terrain O(heights) once and boxes around
     blocks. The kinds of certificates, and their proofs:
     `collide.certificates.certificate`.
     """
@@ -56,8 +69,8 @@ def verify(A, B, X_WA, X_WB, r, *, certificate=None) -> None:
     certificate = r.certificate if certificate is None else certificate
     if certificate is None:
         raise InvalidArgument(
-            "verify: this result carries no certificate (curved shapes, open sign, beyond, or bodies apart of which "
-            "one is a mesh whose hull meets the other)"
+            "verify: this result carries no certificate (an open sign; a region beside another body; a field beside a "
+            "mesh, a field, or a curved shape)"
         )
     claim = TOGETHER if bool(np.all(r.hit)) else APART
     if A.is_region or B.is_region:
@@ -88,12 +101,14 @@ def _flaw_of_parts(A, B, X_WA, X_WB, certificates: Sequence[Certificate], claim:
     parts_a, parts_b = exact_parts(A, X_WA), exact_parts(B, X_WB)
     proven = set()
     for kind, i, j, pairs in certificates:
-        if kind != claim and not (kind == PLANE and claim == APART):
+        if kind not in _PROOFS[claim]:
             return f"the result says {claim}, the certificate {kind!r}"
         if not (0 <= i < len(parts_a) and 0 <= j < len(parts_b)):
             return f"there are no parts {i} and {j}"
         if kind == PLANE:
             flaw = flaw_of_normal(parts_a[i], parts_b[j], pairs[0])
+        elif kind == POINT:
+            flaw = flaw_of_point(parts_a[i], parts_b[j], pairs[0])
         else:
             flaw = flaw_of_proof(parts_a[i], parts_b[j], pairs, hit=kind == TOGETHER)
         if flaw:

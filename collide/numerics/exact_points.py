@@ -80,10 +80,10 @@ class PlacedPoints(Sequence[Point]):
         finer._rows = [tuple(entry << (self.grid - grid) for entry in row) for row in self._rows]
         return finer
 
-    def minus(self, point: Point) -> PlacedPoints:
-        """The same seen from another point of their grid."""
+    def minus(self, point: Point, w: int = 1) -> PlacedPoints:
+        """The same times w > 0, seen from another point of their grid: w (p − point/w)."""
         seen = copy.copy(self)
-        seen._rows = [(*row[:3], row[3] - x) for row, x in zip(self._rows, point)]
+        seen._rows = [(w * a, w * b, w * c, w * t - x) for (a, b, c, t), x in zip(self._rows, point)]
         return seen
 
     def __len__(self) -> int:

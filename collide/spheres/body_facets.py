@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.base.poses_at import poses_at
-from collide.certificates.sphere_cover import leaves_of
+from collide.certificates.exact_parts import leaves_of
 from collide.errors import UnsupportedQuery
 from collide.lowering.convex_sets import convex_set
 from collide.pairs.query import distance

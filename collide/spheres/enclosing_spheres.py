@@ -10,7 +10,8 @@ import numpy as np
 from collide.base import argument_checks as checks
 from collide.base.poses_at import poses_at
 from collide.certificates.certificate import CertificateRefused
-from collide.certificates.sphere_cover import PartCover, flaw_of_cover, leaves_of
+from collide.certificates.exact_parts import leaves_of
+from collide.certificates.sphere_cover import PartCover, flaw_of_cover
 from collide.errors import InvalidArgument
 from collide.shapes.compound import Compound
 from collide.shapes.point_cloud import PointCloud

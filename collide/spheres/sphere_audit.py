@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide.certificates.sphere_cover import PartCover, ball_around, flaw_of_cover, leaves_of
+from collide.certificates.exact_parts import leaves_of
+from collide.certificates.sphere_cover import PartCover, ball_around, flaw_of_cover
 from collide.shapes.shape import Shape
 from collide.spheres.body_facets import BodyPart, Reach, body_parts
 from collide.spheres.convex_pieces import Balls

@@ -93,11 +93,13 @@ def test_unions_certify_every_pair_of_parts_or_the_one_that_meets():
 
 
 def test_what_has_no_certificate_says_so():
-    cylinder, eye = collide.Cylinder(1, 1), np.eye(4)
-    r = collide.distance(cylinder, collide.Sphere(1), eye, collide.pose((3, 0, 0)))
-    assert r.certificate is None
+    """A region beside a cylinder has none yet."""
+    region, cylinder = collide.HPolytope(-np.eye(3), np.zeros(3), bounded=False), collide.Cylinder(1, 1)
+    question = region, cylinder, np.eye(4), collide.pose((-3, 0, 0))
+    r = collide.distance(*question)
+    assert not r.hit and r.certificate is None
     with pytest.raises(collide.InvalidArgument, match="no certificate"):
-        collide.verify(cylinder, collide.Sphere(1), eye, collide.pose((3, 0, 0)), r)
+        collide.verify(*question, r)
 
 
 def test_verifying_needs_no_kernel():

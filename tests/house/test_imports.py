@@ -47,7 +47,10 @@ ROOMS = {
         "errors", "base", "kernels", "transforms", "results", "numerics", "least_distance", "hull", "curved", "support",
         "mesh", "fields", "shapes", "lowering", "broadphase",
     },
-    "certificates": {"errors", "base", "transforms", "results", "numerics", "least_distance", "shapes", "lowering"},
+    "certificates": {
+        "errors", "base", "transforms", "results", "numerics", "least_distance", "hull", "shapes", "lowering",
+        "narrowphase",
+    },
     "pairs": {"errors", "base", "transforms", "results", "shapes", "lowering", "narrowphase", "certificates"},
     "contact": {
         "errors", "base", "kernels", "transforms", "results", "numerics", "hull", "curved", "support", "mesh", "shapes",
