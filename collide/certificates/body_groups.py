@@ -212,4 +212,9 @@ def point_of(part: ExactPart) -> WeightedPoint | None:
         return None
     if part.kind != POINTS:
         return in_lowest_terms(part.placement[1])
-    return in_lowest_terms([c * Fraction(2) ** part.vertices.grid for c in part.vertices[0]])
+    return vertex_of(part, 0)
+
+
+def vertex_of(part: ExactPart, k: int) -> WeightedPoint:
+    """Vertex k of a part."""
+    return in_lowest_terms([c * Fraction(2) ** part.vertices.grid for c in part.vertices[k]])

@@ -16,13 +16,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.certificates.certificate import INSIDE, NO_VERTEX, PLANE, TOGETHER, Certificate, VertexPair
+from collide.certificates.body_groups import point_of, vertex_of
+from collide.certificates.certificate import INSIDE, NO_VERTEX, PLANE, POINT, TOGETHER, Certificate, VertexPair
 from collide.certificates.convex_proofs import flaw_of_proof
-from collide.certificates.exact_parts import ExactPart, exact_parts, has_exact_numbers
+from collide.certificates.exact_parts import ExactPart, exact_parts
 from collide.certificates.nearest_to_origin import nearest_to_origin, nearest_vertex_pairs
+from collide.certificates.point_and_plane import (
+    WeightedPoint,
+    flaw_of_point,
+    holds,
+    reaches,
+    root_no_less,
+    seen_from,
+)
+from collide.certificates.proof_search import common_point, parting_normal, quick_normal
 from collide.certificates.swept_hulls import SweptHulls, hull_numbered, hulls_of
-from collide.certificates.winding_number import winding_number_around
-from collide.lowering.convex_sets import HALFSPACE
+from collide.certificates.winding_number import winding_number
+from collide.lowering.convex_sets import HALFSPACE, POINTS
 from collide.numerics.exact_points import (
     PlacedPoints,
     Point,
@@ -40,6 +50,8 @@ from collide.shapes.swept_mesh import SweptMesh
 EVERY_ITEM = -1
 #: Planes of a certificate at most: of more there is none. Bits of a normal's components. Blocks opened at a time.
 _MAX_PLANES, _BITS, _OPENED = 1000, 40, 256
+#: Bits of the roots in reaches of curved parts, rounded up.
+_ROOT_BITS = 256
 #: Of the numbers added up, what rounding of their products and sums is less than.
 _ROUNDING = 2.0**-48
 #: Where an item lies: beyond a plane, not beyond, or left open by doubles.
@@ -47,9 +59,8 @@ _BEYOND, _OPEN, _NOT_BEYOND = 1, 0, -1
 
 
 def has_field_certificates(A: Shape, B: Shape) -> bool:
-    """Whether pairs of these may have a certificate: a field, and convex parts of exact numbers."""
-    body = B if A.is_field else A
-    return not body.is_asked_whole and all(has_exact_numbers(part) for part in exact_parts(body, np.eye(4)))
+    """Whether pairs of these may have a certificate: a field, and convex parts."""
+    return not (B if A.is_field else A).is_asked_whole
 
 
 class _Plane(NamedTuple):
@@ -107,8 +118,12 @@ def _in_items_frame(items: SweptHulls, normal: Point) -> tuple[tuple[Fraction, F
 
 
 def _height_of(part: ExactPart, normal: Point) -> Fraction:
-    """The largest n·b of a part's vertices; of a half-space's plane, whose normal is a multiple of this."""
-    if part.kind != HALFSPACE:
+    """The largest n·b of a part's vertices, or hardly more than of a curved part; of a half-space's plane, whose normal
+    is a multiple of this.
+    """
+    if part.kind not in (HALFSPACE, POINTS):
+        return max(a + root_no_less(b, _ROOT_BITS) for a, b in reaches(part, normal))
+    if part.kind == POINTS:
         farthest = part.vertices.first_along(opposite(normal))
         return inner(normal, part.vertices[farthest]) * Fraction(2) ** part.vertices.grid
     n, offset = part.plane
@@ -149,19 +164,20 @@ def _is_outside(field: Shape, X_WF: np.ndarray, part: ExactPart) -> bool:
 
     No part reaches across the surface, so a vertex tells of all. A half-space has no end, and the solid has.
     """
-    is_parted = part.kind == HALFSPACE or _number_of_inside(field) is None
-    return is_parted or _winding_number(field, X_WF, part, 0) == 0
+    point = point_of(part)
+    return point is None or _number_of_inside(field) is None or _winding_number(field, X_WF, point) == 0
 
 
-def _winding_number(field: Shape, X_WF: np.ndarray, part: ExactPart, vertex: int) -> int | None:
+def _winding_number(field: Shape, X_WF: np.ndarray, point: WeightedPoint) -> int | None:
     assert isinstance(field, SweptMesh)
-    vertices = PlacedPoints(field.mesh.vertices, [X_WF])
-    return winding_number_around(vertex, part.vertices, vertices, field.mesh.faces)
+    return winding_number(seen_from(PlacedPoints(field.mesh.vertices, [X_WF]), point), field.mesh.faces)
 
 
 def _turned(certificate: Certificate) -> Certificate:
     """The certificate of the same bodies in the opposite order."""
     kind, i, j, rows = certificate
+    if kind == POINT:
+        return Certificate(kind, j, i, rows)
     return Certificate(kind, j, i, tuple(opposite(row) if kind == PLANE else row[::-1] for row in rows))
 
 
@@ -213,15 +229,26 @@ def _first_unparted(items: SweptHulls, planes: Sequence[_Plane]) -> int | None:
 def _flaw_of_hit(
     field: Shape, X_WF: np.ndarray, parts: Sequence[ExactPart], certificates: Sequence[Certificate]
 ) -> str | None:
-    if len(certificates) != 1 or certificates[0].kind not in (TOGETHER, INSIDE):
-        return f'a hit of a field is proven by one certificate "together" or "inside", not {len(certificates)}'
+    if len(certificates) != 1 or certificates[0].kind not in (TOGETHER, INSIDE, POINT):
+        return f'a hit of a field is proven by one certificate "together", "inside" or "point", not {len(certificates)}'
     kind, i, j, pairs = certificates[0]
     if not 0 <= j < len(parts):
         return f"there is no part {j}"
     if kind == INSIDE:
         return _flaw_of_inside(field, X_WF, i, parts[j], pairs)
+    if kind == POINT and i == _number_of_inside(field):
+        return _flaw_of_point_inside(field, X_WF, parts[j], pairs[0])
     item = hull_numbered(field, X_WF, i)
-    return f"there is no item {i}" if item is None else flaw_of_proof(item, parts[j], pairs, hit=True)
+    if item is None:
+        return f"there is no item {i}"
+    return flaw_of_point(item, parts[j], pairs[0]) if kind == POINT else flaw_of_proof(item, parts[j], pairs, hit=True)
+
+
+def _flaw_of_point_inside(field: Shape, X_WF: np.ndarray, part: ExactPart, point: WeightedPoint) -> str | None:
+    if point[3] <= 0 or not holds(part, point):
+        return "the body does not hold the point (x, y, z, w), w > 0"
+    winding = _winding_number(field, X_WF, point)
+    return None if winding is not None and winding > 0 else "the point does not lie in the solid"
 
 
 def _flaw_of_inside(
@@ -229,9 +256,9 @@ def _flaw_of_inside(
 ) -> str | None:
     if number != _number_of_inside(field):
         return f"item {number} is not the inside of a solid"
-    if part.kind == HALFSPACE or len(pairs) != 1 or pairs[0][0] != NO_VERTEX or not 0 <= pairs[0][1] < len(part):
+    if part.kind != POINTS or len(pairs) != 1 or pairs[0][0] != NO_VERTEX or not 0 <= pairs[0][1] < len(part):
         return "−1 is needed for the solid, and one vertex of the other body"
-    winding = _winding_number(field, X_WF, part, pairs[0][1])
+    winding = _winding_number(field, X_WF, vertex_of(part, pairs[0][1]))
     return None if winding is not None and winding > 0 else f"vertex {pairs[0][1]} does not lie in the solid"
 
 
@@ -244,14 +271,18 @@ def field_certificate(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, ro
         return None
     field, body, X_WF, X_WS = (A, B, X_WA, X_WB) if A.is_field else (B, A, X_WB, X_WA)
     numbers = [int(row["part_a"]), int(row["part_b"])]
-    make = _of_hit if row["hit"] else _of_gap
-    certificates = make(field, X_WF, exact_parts(body, X_WS), numbers if A.is_field else numbers[::-1])
+    parts = exact_parts(body, X_WS)
+    if row["hit"]:
+        near = [row["point_a"], row["point_b"], 0.5 * (row["point_a"] + row["point_b"])]
+        certificates = _of_hit(field, X_WF, parts, numbers if A.is_field else numbers[::-1], near)
+    else:
+        certificates = _of_gap(field, X_WF, parts)
     if certificates is None or A.is_field:
         return certificates
     return tuple(map(_turned, certificates))
 
 
-def _of_gap(field: Shape, X_WF: np.ndarray, parts: list[ExactPart], numbers) -> tuple[Certificate, ...] | None:
+def _of_gap(field: Shape, X_WF: np.ndarray, parts: list[ExactPart]) -> tuple[Certificate, ...] | None:
     certificates: list[Certificate] = []
     items = hulls_of(field, X_WF)
     for j, part in enumerate(parts):
@@ -263,25 +294,33 @@ def _of_gap(field: Shape, X_WF: np.ndarray, parts: list[ExactPart], numbers) -> 
     return tuple(certificates)
 
 
-def _of_hit(field: Shape, X_WF: np.ndarray, parts: list[ExactPart], numbers) -> tuple[Certificate, ...] | None:
+def _of_hit(
+    field: Shape, X_WF: np.ndarray, parts: list[ExactPart], numbers, near: list[np.ndarray]
+) -> tuple[Certificate, ...] | None:
     """Of the item and the part named, or of the first item that planes cannot part from a part."""
     i, j = numbers
     j = j if 0 <= j < len(parts) else 0  # facets of a convex body are numbered as well
     named = hull_numbered(field, X_WF, i)
-    if named is not None and (certificate := _of_item(named, i, parts[j], j)):
+    if named is not None and (certificate := _of_item(named, i, parts[j], j, near)):
         return (certificate,)
     items, inside = hulls_of(field, X_WF), _number_of_inside(field)
     for k in sorted(range(len(parts)), key=lambda k: k != j):
         met = _part_all(items, parts[k], _own_planes(items, parts[k]))
-        if met is not None and (certificate := _of_item(met.part(0), int(met.numbers[0]), parts[k], k)):
+        if met is not None and (certificate := _of_item(met.part(0), int(met.numbers[0]), parts[k], k, near)):
             return (certificate,)
+        point = point_of(parts[k]) if parts[k].kind != POINTS else None
+        if point and inside is not None and _flaw_of_point_inside(field, X_WF, parts[k], point) is None:
+            return (Certificate(POINT, inside, k, (point,)),)
         if inside is not None and _flaw_of_inside(field, X_WF, inside, parts[k], [(NO_VERTEX, 0)]) is None:
             return (Certificate(INSIDE, inside, k, ((NO_VERTEX, 0),)),)
     return None
 
 
-def _of_item(item: ExactPart, i: int, part: ExactPart, j: int) -> Certificate | None:
-    """That an item and a part meet, where they do."""
+def _of_item(item: ExactPart, i: int, part: ExactPart, j: int, near: list[np.ndarray]) -> Certificate | None:
+    """That an item and a part meet, where they do. near : (3,) points tried first where the part is curved."""
+    if part.kind not in (POINTS, HALFSPACE):
+        point = common_point(item, part, near)
+        return point and Certificate(POINT, i, j, (point,))
     pairs = _pairs_of(item, part)
     return Certificate(TOGETHER, i, j, tuple(pairs)) if flaw_of_proof(item, part, pairs, hit=True) is None else None
 
@@ -327,9 +366,17 @@ def _away(items: SweptHulls, part: ExactPart) -> np.ndarray:
     if part.kind == HALFSPACE:
         n = X[:3, :3].T @ np.array([float(c) for c in part.plane[0]])
         return (items.facing(n) @ n).min(axis=1) - items.radii * np.linalg.norm(n)
+    if part.kind != POINTS:
+        middle = (np.array([float(c) for c in part.placement[1]]) - X[:3, 3]) @ X[:3, :3]
+        return _squared_away(items, middle)
     vertex = [float(Fraction(c) * Fraction(2) ** part.vertices.grid) for c in part.vertices[0]]
     centre = part.points_P.mean(axis=0) - part.points_P[0]
     middle = (np.array(vertex) + part.poses[-1][:3, :3] @ centre - X[:3, 3]) @ X[:3, :3]
+    return _squared_away(items, middle)
+
+
+def _squared_away(items: SweptHulls, middle: np.ndarray) -> np.ndarray:
+    """(n,) squares of how far boxes around items are from a point of their frame, radii left out."""
     low, high = items.points.min(axis=1), items.points.max(axis=1)
     return np.square(np.maximum(np.maximum(low - middle, middle - high), 0.0)).sum(axis=1)
 
@@ -339,6 +386,11 @@ def _parting(item: SweptHulls, part: ExactPart) -> _Plane | None:
     if part.kind == HALFSPACE:
         return None
     single = item.part(0)
+    if part.kind != POINTS:
+        search = quick_normal if item.opened else parting_normal
+        normal = search(single, part)
+        plane = normal and _plane(item, part, normal)
+        return plane if plane and plane.parts_exactly(item, 0) else None
     grid = min(single.vertices.grid, part.vertices.grid)
     points, vertices = single.vertices.on_grid(grid), part.vertices.on_grid(grid)
     pairs = nearest_vertex_pairs(points, vertices, [(0, 0)])

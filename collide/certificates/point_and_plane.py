@@ -154,3 +154,12 @@ def in_lowest_terms(x: Sequence[Fraction]) -> WeightedPoint:
     """A point of fractions [m] as integers over the least common denominator."""
     w = math.lcm(*(c.denominator for c in x))
     return (*(int(c * w) for c in x), w)  # type: ignore[return-value]
+
+
+def root_no_less(square: Fraction, digits: int) -> Fraction:
+    """√square where the root is a fraction, else a fraction above the root, by less than 2^-digits of the root."""
+    p, q = square.numerator, square.denominator
+    if math.isqrt(p) ** 2 == p and math.isqrt(q) ** 2 == q:
+        return Fraction(math.isqrt(p), math.isqrt(q))
+    shift = max(digits + q.bit_length() - p.bit_length(), digits)
+    return Fraction(math.isqrt((p << 2 * shift) // q) + 1, 1 << shift)

@@ -22,6 +22,7 @@ from collide.certificates.point_and_plane import (
     flaw_of_normals,
     flaw_of_point,
     in_lowest_terms,
+    root_no_less,
 )
 from collide.lowering.convex_sets import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS
 from collide.numerics.exact_points import PlacedPoints, Point, in_integers, leading_digits, opposite
@@ -300,7 +301,7 @@ def _deepest(halfspace: ExactPart, body: ExactPart) -> Iterator[WeightedPoint]:
         stretched = [(sizes[0] * x, x * x) for x in w[:2]]
     square = sum((square for _, square in stretched), Fraction(0))
     for digits in _ROOT_BITS:
-        root = _root_no_less(square, digits)
+        root = root_no_less(square, digits)
         rim = [x / root if root else Fraction(0) for x, _ in stretched]
         heights = [Fraction(0)] if body.kind == ELLIPSOID else [sizes[1], -sizes[1]]
         for height in heights:
@@ -340,15 +341,6 @@ def _between(A: ExactPart, B: ExactPart) -> WeightedPoint:
 def _in_metres(points: PlacedPoints, k: int) -> tuple[Fraction, Fraction, Fraction]:
     x, y, z = (c * Fraction(2) ** points.grid for c in points[k])
     return x, y, z
-
-
-def _root_no_less(square: Fraction, digits: int) -> Fraction:
-    """√square where the root is a fraction, else a fraction above the root, by less than 2^-digits of the root."""
-    p, q = square.numerator, square.denominator
-    if math.isqrt(p) ** 2 == p and math.isqrt(q) ** 2 == q:
-        return Fraction(math.isqrt(p), math.isqrt(q))
-    shift = max(digits + q.bit_length() - p.bit_length(), digits)
-    return Fraction(math.isqrt((p << 2 * shift) // q) + 1, 1 << shift)
 
 
 # --- the algebra of curved pairs ----------------------------------------------------------------

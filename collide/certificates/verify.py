@@ -70,7 +70,7 @@ def verify(A, B, X_WA, X_WB, r, *, certificate=None) -> None:
     if certificate is None:
         raise InvalidArgument(
             "verify: this result carries no certificate (an open sign; a region beside another body; a field beside a "
-            "mesh, a field, or a curved shape)"
+            "mesh or a field)"
         )
     claim = TOGETHER if bool(np.all(r.hit)) else APART
     if A.is_region or B.is_region:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from claimed_result import Claim
 from curved_oracle import bracket
+from hollow_bodies import torus
 from mesh_families import random_pose, right_angle_pose
 from mesh_shapes import block_ring, box, bumpy_sphere
 from naive import rng_of
@@ -18,17 +19,6 @@ from collide.certificates.certificate import CertificateRefused
 from collide.results import UNDECIDED
 
 EYE = np.eye(4)
-
-
-def torus(n: int, m: int) -> collide.Mesh:
-    """Of 2 n m facets, radii 1 and 0.3."""
-    u, v = np.meshgrid(np.arange(n) * 2 * np.pi / n, np.arange(m) * 2 * np.pi / m, indexing="ij")
-    away = 1.0 + 0.3 * np.cos(v)
-    vertices = np.stack([away * np.cos(u), away * np.sin(u), 0.3 * np.sin(v)], axis=-1).reshape(-1, 3)
-    i, j = np.divmod(np.arange(n * m), m)
-    a, b = i * m + j, (i + 1) % n * m + j
-    c, d = (i + 1) % n * m + (j + 1) % m, i * m + (j + 1) % m
-    return collide.Mesh(vertices, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]))
 
 
 def shapes() -> list:
@@ -73,12 +63,12 @@ THROUGH = collide.pose((0.05, 0, 0), rpy=(0.1, 0.05, 0))
 
 
 @pytest.mark.parametrize("B, X_WB", [
-    (torus(20, 12), LINKED), (collide.Cylinder(0.5, 3), THROUGH), (collide.Ellipsoid((0.5, 0.5, 3)), THROUGH),
+    (torus(1.0, 0.3, 20, 12), LINKED), (collide.Cylinder(0.5, 3), THROUGH), (collide.Ellipsoid((0.5, 0.5, 3)), THROUGH),
     (collide.Capsule(0.5, 3), THROUGH),
-    (collide.Compound([(collide.Cylinder(0.5, 3), EYE), (torus(10, 6), collide.pose((0, 0, 1)))]), THROUGH),
+    (collide.Compound([(collide.Cylinder(0.5, 3), EYE), (torus(1.0, 0.3, 10, 6), collide.pose((0, 0, 1)))]), THROUGH),
 ], ids=["link", "cylinder", "ellipsoid", "capsule", "union"])
 def test_planes_between_linked_bodies_are_few(B, X_WB):
-    A = torus(20, 12)
+    A = torus(1.0, 0.3, 20, 12)
     r = collide.distance(A, B, EYE, X_WB)
     assert not r.hit and 4 < len(r.certificate) < 60 and len(json.dumps(r.certificate)) < 2000
     collide.verify(A, B, EYE, X_WB, r)
