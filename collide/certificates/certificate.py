@@ -27,14 +27,15 @@ out, and no surface of a body in a solid of the other.
 Fields (`field_proofs.py`) have items in the place of parts: a row of ``points`` of a cloud, the number of a cell of a
 grid, a row of ``faces`` of a swept mesh, a facet on top of large terrain, for the prism between facet and bottom.
 Vertices of an item are numbered in sorted order. together, or for a curved part a point, one item and one part meet;
-inside, a vertex of a part lies in a swept solid, whose inside is the item after its triangles; apart, for every part of the other body "plane"
-certificates with the item −1: every item lies beyond one of these planes, by more than both radii.
+inside, a vertex of a part lies in a swept solid, whose inside is the item after its triangles; apart, for every part of
+the other body "plane" certificates with the item −1: every item lies beyond one of these planes, by more than both
+radii. Fields beside meshes and fields go by items as meshes do, cells of a grid numbered in their order.
 
 A region of half-spaces (`HPolytope` with ``bounded=False``) and points swept by a ball have a certificate of their own
 (`region_proofs.py`), naming half-spaces.
 
-Without a certificate are: regions beside other bodies; fields beside meshes and fields; results with
-an open sign.
+Without a certificate are: regions beside other bodies; large terrain beside meshes and fields; results with an open
+sign.
 
 Vertex ids are rows of `PackedConvex.points`: the points of a `ConvexHull` as handed in, the corners of a `Box` by sign
 (−−−, −−+, …), the ends of a `Capsule`, the rounded ``vertices`` of an `HPolytope`; of a `Mesh` rows of its

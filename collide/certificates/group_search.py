@@ -13,12 +13,14 @@ from collide.numerics.exact_points import leading_digits
 
 #: The normals found last that are tried for the next pair.
 _RECENT = 2
+#: Connected surfaces asked whether they are inside a solid, at most.
+_MAX_SURFACES = 1000
 
 
 def parted(A: BodyGroups, B: BodyGroups, guesses: Sequence[np.ndarray]) -> tuple[Certificate, ...] | None:
     """Planes between all items of A and B; ``None`` where they meet, or pairs are too many. O(pairs of near groups)."""
     planes = _planes_or_meeting(A, B, guesses)
-    if not isinstance(planes, dict) or flaw_of_outside(A, B) is not None:
+    if not isinstance(planes, dict) or flaw_of_outside(A, B, planes) is not None:
         return None
     return tuple(Certificate(PLANE, i, j, (n,)) for (i, j), n in planes.items())
 
@@ -28,10 +30,10 @@ def meeting(
 ) -> tuple[Certificate, ...] | None:
     """A common point of two items, or of an item and the inside of a solid. named : the items tried first."""
     a, b = A.item(named[0]), B.item(named[1])
-    point = common_point(a, b, points, guesses) if a and b else None
+    point = None if a is None or b is None else common_point(a, b, points, guesses)
     if point:
         return (Certificate(POINT, *named, (point,)),)
-    for certificate in _insides(A, B):
+    for certificate in _insides(A, B, named):
         return (certificate,)
     items = _planes_or_meeting(A, B, guesses)
     if items is None or isinstance(items, dict):
@@ -41,14 +43,15 @@ def meeting(
     return (Certificate(POINT, i, j, (point,)),) if point else None
 
 
-def _insides(A: BodyGroups, B: BodyGroups) -> Iterator[Certificate]:
-    """For each solid of a body that holds a point of a surface of the other."""
-    for solids, body in ((A, B), (B, A)):
-        for k, solid in solids.solids:
-            for item, part in body.surfaces:
-                point = point_of(part)
-                if point and solid.holds(point):
-                    pair = (-1 - k, item) if solids is A else (item, -1 - k)
+def _insides(A: BodyGroups, B: BodyGroups, named: tuple[int, int]) -> Iterator[Certificate]:
+    """For each solid that holds a point of a surface of the other body, the item named first."""
+    for solids, body, side in ((A, B, 1), (B, A, 0)):
+        for number in (named[side], *body.surfaces[:_MAX_SURFACES]) if solids.solids else ():
+            part = body.item(number)
+            point = None if part is None else point_of(part)
+            for k, solid in solids.solids if point else ():
+                if solid.holds(point):  # type: ignore[arg-type]
+                    pair = (-1 - k, number) if side else (number, -1 - k)
                     yield Certificate(POINT, *pair, (point,))
 
 
@@ -76,7 +79,7 @@ def _planes_or_meeting(A: BodyGroups, B: BodyGroups, guesses: Sequence[np.ndarra
             (a,), (b,) = parts_a, parts_b
             n = exact_normal(a, b, recent)
             if n is None:
-                return A.number(i), B.number(j)
+                return A.numbers(i)[0], B.numbers(j)[0]
         planes[i, j] = n
         recent = [np.array(leading_digits(n)), *recent][:_RECENT]
     return planes

@@ -9,11 +9,11 @@ from fractions import Fraction
 
 import numpy as np
 
-from collide.certificates.body_groups import BodyGroups
+from collide.certificates.body_groups import BodyGroups, has_groups
 from collide.certificates.certificate import APART, INSIDE, NO_VERTEX, PLANE, POINT, TOGETHER, Certificate, VertexPair
 from collide.certificates.convex_proofs import flaw_of_proof
 from collide.certificates.exact_parts import ExactPart, common_vertices, exact_parts
-from collide.certificates.field_proofs import field_certificate
+from collide.certificates.field_proofs import field_certificate, has_field_certificates
 from collide.certificates.group_search import meeting, parted
 from collide.certificates.mesh_proofs import ProofBody, flaw_of_inside_proof
 from collide.certificates.nearest_to_origin import nearest_vertex_pairs
@@ -78,8 +78,10 @@ def certificate_of_row(A, B, X_WA, X_WB, row) -> Certificates:
     """The certificate of a row of `distance` at poses (1, 4, 4); ``None`` for a pair without a certificate."""
     if row["how"] == UNDECIDED:
         return None
-    if A.is_field or B.is_field:
+    if (A.is_field or B.is_field) and has_field_certificates(A, B):
         return field_certificate(A, B, X_WA[0], X_WB[0], row)
+    if A.is_field or B.is_field:
+        return _of_groups(A, B, X_WA[0], X_WB[0], row)
     if A.is_region or B.is_region:
         return make_region_certificate(A, B, X_WA[0], X_WB[0])
     if A.meshed or B.meshed:
@@ -164,6 +166,8 @@ def _of_meshes(A: ProofBody, B: ProofBody, row) -> Certificates:
 
 def _of_groups(A, B, X_WA: np.ndarray, X_WB: np.ndarray, row) -> Certificates:
     """Planes between groups of items, or a point that two items hold."""
+    if not (has_groups(A) and has_groups(B)):
+        return None
     a, b, normals = BodyGroups(A, X_WA), BodyGroups(B, X_WB), [-row["normal"]]
     if row["hit"]:
         return meeting(a, b, _points_of(row), normals, (int(row["part_a"]), int(row["part_b"])))

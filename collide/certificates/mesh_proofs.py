@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from collide.certificates.body_groups import BodyGroups, Planes, flaw_of_meeting, flaw_of_outside, flaw_of_planes
+from collide.certificates.body_groups import flaw_of_group_certificates
 from collide.certificates.certificate import (
     APART,
     INSIDE,
@@ -92,14 +92,8 @@ def flaw_of_mesh_certificates(A, B, X_WA, X_WB, certificates: Sequence[Certifica
 
     None where they do.
     """
-    kinds = {certificate.kind for certificate in certificates}
-    if claim == APART and kinds == {PLANE}:
-        planes: Planes = {(i, j): rows[0] for _, i, j, rows in certificates}
-        a, b = BodyGroups(A, X_WA), BodyGroups(B, X_WB)
-        return flaw_of_planes(a, b, planes) or flaw_of_outside(a, b)
-    if claim == TOGETHER and kinds == {POINT} and len(certificates) == 1:
-        ((_, i, j, (point,)),) = certificates
-        return flaw_of_meeting(BodyGroups(A, X_WA), BodyGroups(B, X_WB), i, j, point)
+    if {certificate.kind for certificate in certificates} <= {PLANE, POINT} and certificates:
+        return flaw_of_group_certificates(A, B, X_WA, X_WB, certificates, claim)
     body_a, body_b = ProofBody(A, X_WA), ProofBody(B, X_WB)
     if not (body_a.has_certificates and body_b.has_certificates):
         return "these shapes have certificates of planes, or of a point, alone"

@@ -58,6 +58,11 @@ class SweptHulls(NamedTuple):
         points = self.points[row]
         return np.where(_CORNERS, points[1], points[0]) if self.are_boxes else points
 
+    @property
+    def corners(self) -> np.ndarray:
+        """(n, k, 3) the vertices of all items."""
+        return np.where(_CORNERS, self.points[:, 1:], self.points[:, :1]) if self.are_boxes else self.points
+
     def part(self, row: int) -> ExactPart:
         """An item; its vertices are distinct and sorted."""
         X_FG, X_WF = self.poses

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from collide.base import argument_checks as checks
+from collide.certificates.body_groups import flaw_of_group_certificates
 from collide.certificates.certificate import (
     APART,
     PLANE,
@@ -18,7 +19,7 @@ from collide.certificates.certificate import (
 )
 from collide.certificates.convex_proofs import flaw_of_proof
 from collide.certificates.exact_parts import exact_parts
-from collide.certificates.field_proofs import flaw_of_field_certificates
+from collide.certificates.field_proofs import flaw_of_field_certificates, has_field_certificates
 from collide.certificates.mesh_proofs import flaw_of_mesh_certificates
 from collide.certificates.point_and_plane import flaw_of_normal, flaw_of_point
 from collide.certificates.region_proofs import flaw_of_region_certificate
@@ -69,8 +70,8 @@ def verify(A, B, X_WA, X_WB, r, *, certificate=None) -> None:
     certificate = r.certificate if certificate is None else certificate
     if certificate is None:
         raise InvalidArgument(
-            "verify: this result carries no certificate (an open sign; a region beside another body; a field beside a "
-            "mesh or a field)"
+            "verify: this result carries no certificate (an open sign; a region beside another body; large terrain "
+            "beside a mesh or a field)"
         )
     claim = TOGETHER if bool(np.all(r.hit)) else APART
     if A.is_region or B.is_region:
@@ -81,7 +82,7 @@ def verify(A, B, X_WA, X_WB, r, *, certificate=None) -> None:
     certificates = read_certificates(certificate)
     flaw_of = flaw_of_mesh_certificates if A.meshed or B.meshed else _flaw_of_parts
     if A.is_field or B.is_field:
-        flaw_of = flaw_of_field_certificates
+        flaw_of = flaw_of_field_certificates if has_field_certificates(A, B) else flaw_of_group_certificates
     flaw = flaw_of(A, B, X_WA[0], X_WB[0], certificates, claim)
     if flaw:
         raise CertificateRefused(flaw)

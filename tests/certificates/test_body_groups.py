@@ -27,7 +27,7 @@ UNION = collide.Compound([
 
 def _numbers(groups: BodyGroups, k: int = 0) -> list[int]:
     if groups.group(k).n_items == 1:
-        return [groups.number(k)]
+        return groups.numbers(k)
     return _numbers(groups, 2 * k + 1) + _numbers(groups, 2 * k + 2)
 
 
@@ -65,8 +65,7 @@ def test_surfaces_are_the_connected_ones():
     two = collide.Mesh(
         np.concatenate([box()[0], box()[0] + 9.0]), np.concatenate([box()[1], box()[1] + len(box()[0])])
     )
-    numbers = [k for k, _ in BodyGroups(two, EYE).surfaces]
-    assert numbers == [0, len(box()[1])]
+    assert BodyGroups(two, EYE).surfaces == [0, len(box()[1])]
     assert len(BodyGroups(UNION, EYE).surfaces) == 4 and len(BodyGroups(BALL, EYE).surfaces) == 1
 
 
@@ -94,9 +93,9 @@ def test_planes_must_part_every_pair():
 def test_outside_of_solids():
     inside, beside = BodyGroups(collide.Sphere(0.1), EYE), BodyGroups(collide.Sphere(0.1), collide.pose((9, 0, 0)))
     ball = BodyGroups(BALL, EYE)
-    assert "part 0 of A" in flaw_of_outside(ball, inside) and "part 0 of B" in flaw_of_outside(inside, ball)
-    assert flaw_of_outside(ball, beside) is None
-    assert flaw_of_outside(BodyGroups(collide.Mesh(BALL.vertices, BALL.faces, solid=False), EYE), inside) is None
+    assert "part 0 of A" in flaw_of_outside(ball, inside, {}) and "part 0 of B" in flaw_of_outside(inside, ball, {})
+    assert flaw_of_outside(ball, beside, {}) is None and flaw_of_outside(ball, inside, {(0, 0): (1, 0, 0)}) is None
+    assert flaw_of_outside(BodyGroups(collide.Mesh(BALL.vertices, BALL.faces, solid=False), EYE), inside, {}) is None
 
 
 def test_points_in_items_and_in_solids():

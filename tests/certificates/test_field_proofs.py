@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 from fractions import Fraction
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from field_unions import random_grid
 
 import collide
 from collide.certificates.certificate import CertificateRefused
+from collide.shapes import height_field
 
 EYE = np.eye(4)
 
@@ -90,10 +92,11 @@ def test_a_large_cloud_needs_few_planes():
 
 
 def test_what_has_no_proof_says_so():
-    cloud, near = collide.PointCloud([(0, 0, 0)], 0.1), collide.pose((0.5, 0, 0))
-    mesh = collide.Mesh(*collide.tessellate(collide.Box((0.1, 0.1, 0.1)))[:2])
-    for shape in (cloud, mesh):
-        row = collide.distance(cloud, shape, EYE, near)
-        assert row.certificate is None
+    """Large terrain has no list of items, which pairs with meshes and fields go by."""
+    cloud, far = collide.PointCloud([(0, 0, 0)], 0.1), collide.pose((0, 0, 3))
+    with mock.patch.object(height_field, "_MAX_MESHED", 0):
+        terrain = collide.HeightField(np.zeros((4, 4)), (0.5, 0.5), bottom=-1.0)
+        row = collide.distance(terrain, cloud, EYE, far)
+        assert not row.hit and row.certificate is None
         with pytest.raises(collide.InvalidArgument, match="carries no certificate"):
-            collide.verify(cloud, shape, EYE, near, row)
+            collide.verify(terrain, cloud, EYE, far, row)
