@@ -95,11 +95,11 @@ def reaches(part: ExactPart, n: Point) -> list[Reach]:
 
 
 def holds(part: ExactPart, point: WeightedPoint) -> bool:
-    """Whether a part holds a point, w > 0; ``False`` of a curved part that its matrix makes flat."""
+    """Whether a part holds a point, w > 0; ``False`` of curved parts and half-spaces that a matrix makes flat."""
     w = point[3]
     if part.kind == HALFSPACE:
         n, offset = part.plane
-        return inner(n, point) <= offset * w
+        return any(n) and inner(n, point) <= offset * w
     if part.kind == POINTS:
         return _hull_is_near(part, point)
     (r0, r1, r2), t = part.placement

@@ -192,6 +192,8 @@ def common_point(
 
     points, normals : (3,) doubles, a point near both and directions from B to A, tried first.
     """
+    if any(part.kind == HALFSPACE and not any(part.plane[0]) for part in (A, B)):
+        return None
     near = [weighted(x) for x in points if np.isfinite(x).all()]
     return next((x for x in _candidates(A, B, near, normals) if flaw_of_point(A, B, x) is None), None)
 

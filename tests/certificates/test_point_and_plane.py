@@ -21,6 +21,7 @@ from collide.certificates.point_and_plane import (
     reaches,
     sign_with_roots,
 )
+from collide.certificates.proof_search import common_point
 
 EYE = np.eye(4)
 
@@ -116,8 +117,10 @@ def test_a_half_space_is_parted_along_its_normal_alone():
 def test_a_flat_matrix_holds_no_point():
     X = np.eye(4)
     X[2, 2] = 0.0
-    (part,) = exact_parts(collide.Cylinder(1.0, 2.0), X)
-    assert not holds(part, (0, 0, 0, 1))
+    for shape in (collide.Cylinder(1.0, 2.0), collide.Ellipsoid((1, 2, 3)), collide.Halfspace((1, 0, 0), 1.0)):
+        (part,) = exact_parts(shape, X)
+        assert not holds(part, (0, 0, 0, 1)), shape
+        assert common_point(part, exact_parts(collide.Sphere(1.0), EYE)[0]) is None
 
 
 def test_signs_with_roots():

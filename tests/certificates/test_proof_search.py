@@ -56,11 +56,11 @@ def test_pairs_that_touch_and_pairs_beside():
 @pytest.mark.slow
 def test_many_pairs_that_touch_and_pairs_beside():
     rng, seen = rng_of("many certificates of curved pairs"), Counter()
-    for k in range(5000):
+    for k in range(2000):
         scale = 2.0 ** int(rng.integers(-30, 31)) if k % 3 == 0 else 1.0
         pair = exact_pair(rng, scale, 2.0**-40 if k % 7 == 0 else 1.0) if k % 2 else near_pair(rng, scale)
         _check(pair, seen, signed=bool(k % 5))
-    assert seen["point"] > 2000 and seen["plane"] > 1000 and not seen["undecided"], seen
+    assert seen["point"] > 1000 and seen["plane"] > 300 and not seen["undecided"], seen
 
 
 def _check(pair, seen: Counter, signed: bool) -> None:
