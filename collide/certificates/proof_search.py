@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
+from functools import reduce
 from itertools import combinations, permutations
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -108,7 +109,7 @@ def _proposals(a: RoughUnion, b: RoughUnion, guesses: Iterable[np.ndarray]) -> I
         side, axis = divmod(int(np.argmax(gaps)), 3)
         yield ((1.0 - 2.0 * side) * np.eye(3)[axis]).tolist()
     for guess in guesses:
-        if float(guess @ (a.support(-guess) - b.support(guess))) > 0.0:
+        if float(_product(guess, a.support(-guess) - b.support(guess))) > 0.0:
             yield guess.tolist()
     unit = float(max((a.high - a.low).max(), (b.high - b.low).max(), np.abs(a.low - b.low).max())) / (1 << _GRID)
     if not 0.0 < unit < math.inf:
@@ -117,7 +118,7 @@ def _proposals(a: RoughUnion, b: RoughUnion, guesses: Iterable[np.ndarray]) -> I
     simplex: list[Point] = []
     for _ in range(_ROUNDS):
         away = a.support(-v) - b.support(v)
-        if float(v @ away) > 0.0:
+        if float(_product(v, away)) > 0.0:
             yield v.tolist()
         x, y, z = np.rint(away / unit).tolist()
         new = int(x), int(y), int(z)
@@ -144,7 +145,12 @@ class RoughUnion:
 
     def support(self, n: np.ndarray) -> np.ndarray:
         """(3,) a point farthest along n."""
-        return max((part.support(n) for part in self.parts), key=lambda x: float(n @ x))
+        return max((part.support(n) for part in self.parts), key=lambda x: float(_product(n, x)))
+
+
+def _product(columns: Iterable[np.ndarray], factors: Iterable) -> np.ndarray:
+    """Σ columns · factors, each product and sum rounded by itself: the same bits on every machine, unlike BLAS."""
+    return reduce(np.add, (column * factor for column, factor in zip(columns, factors)))
 
 
 class RoughPart:
@@ -152,10 +158,10 @@ class RoughPart:
 
     def __init__(self, part: ExactPart):
         self.kind, self.radius = part.kind, float(part.radius)
-        X = np.linalg.multi_dot([*part.poses[::-1], np.eye(4)]) if len(part.poses) > 1 else part.poses[0]
+        X = reduce(lambda inner_pose, X: _product(X.T[:, :, None], inner_pose), part.poses)
         self.R, self.t = X[:3, :3], X[:3, 3]
         if part.kind == POINTS:
-            self.points = part.points_P @ self.R.T + self.t
+            self.points = _product(part.points_P.T[:, :, None], self.R.T) + self.t
         else:
             self.sizes = np.array(part.params[:3], dtype=float)
 
@@ -166,12 +172,13 @@ class RoughPart:
     def support(self, n: np.ndarray) -> np.ndarray:
         """(3,) a point farthest along n."""
         if self.kind == POINTS:
-            length = math.sqrt(float(n @ n))
-            return self.points[int(np.argmax(self.points @ n))] + (n * (self.radius / length) if length else 0.0)
-        w = n @ self.R
+            length = math.hypot(*n.tolist())
+            farthest = self.points[int(np.argmax(_product(self.points.T, n)))]
+            return farthest + (n * (self.radius / length) if length else 0.0)
+        w = _product(self.R, n)
         if self.kind == ELLIPSOID:
             u = self.sizes**2 * w
-            return self.t + self.R @ (u / (math.sqrt(float(u @ w)) or 1.0))
+            return self.t + _product(self.R.T, u / (math.sqrt(float(_product(u, w))) or 1.0))
         radius, half = self.sizes[:2].tolist()
         across = math.hypot(w[0], w[1])
         x, y = (radius * float(c) / across if across else 0.0 for c in w[:2])
@@ -179,7 +186,7 @@ class RoughPart:
             x, y, z = 0.0, 0.0, half
         else:
             z = half if w[2] > 0.0 and self.kind == CYLINDER else -half
-        return self.t + self.R @ np.array((x, y, z))
+        return self.t + _product(self.R.T, (x, y, z))
 
 
 # --- a point ------------------------------------------------------------------------------------
