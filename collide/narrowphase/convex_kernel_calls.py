@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from threading import local
 
@@ -134,7 +136,7 @@ def _finish(
 def _settle_curved(rows, pairs, table: ShapeTable, poses: PoseTable, shape_of, *, boolean: bool, limit: float) -> None:
     """Settle in place what is still open, by `settle_curved`, which needs the rows of a distance."""
     undecided = np.flatnonzero(rows["how"] == UNDECIDED)
-    if not len(undecided):
+    if not len(undecided) or _of_thread.leaves_touching_open:
         return
     if not boolean:
         settle_curved(rows, undecided, pairs, table, poses, shape_of, limit)
@@ -142,6 +144,17 @@ def _settle_curved(rows, pairs, table: ShapeTable, poses: PoseTable, shape_of, *
     measured = run_pairs(table, poses, shape_of, pairs[undecided], boolean=False, limit=limit)
     for name in ("how", "hit", "certified"):
         rows[name][undecided] = measured[name]
+
+
+@contextmanager
+def leaving_touching_open() -> Iterator[None]:
+    """Within, this thread leaves pairs of curved sets open that touch within rounding: for searches that try places
+    where bodies just part. An open pair counts as a hit, so that no place is taken for free."""
+    before, _of_thread.leaves_touching_open = _of_thread.leaves_touching_open, True
+    try:
+        yield
+    finally:
+        _of_thread.leaves_touching_open = before
 
 
 def number_of_poses(X_WA: np.ndarray, X_WB: np.ndarray) -> int:
@@ -257,6 +270,7 @@ class _OfThread(local):
 
     def __init__(self) -> None:
         self.space = BlockWorkspace()
+        self.leaves_touching_open = False
 
 
 _of_thread = _OfThread()

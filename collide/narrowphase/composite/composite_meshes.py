@@ -21,7 +21,7 @@ from collide.lowering.shape_table import ShapeTable
 from collide.narrowphase.composite.composite_mesh_pairs import part_rows, part_states
 from collide.narrowphase.composite.composite_parts import Balls, CompoundParts, boxes_near, compound_parts
 from collide.narrowphase.convex_batches import convex_hits, convex_rows
-from collide.narrowphase.convex_kernel_calls import run_poses
+from collide.narrowphase.convex_kernel_calls import leaving_touching_open, run_poses
 from collide.narrowphase.facets.facet_queries import points_in_solid, surface_distances
 from collide.narrowphase.facets.mesh_collide_kernel import APART, HIT, OPEN
 from collide.narrowphase.facets.separating_translation import SeparatingTranslation, shortened
@@ -525,7 +525,8 @@ def _overlap(
         if A.unbounded or B.unbounded:
             length, bound, normal = _way_out(A, B, X_WA, X_WB, meeting)
         else:
-            length, bound, normal = _separating_translation(A, B, X_WA, X_WB, meeting)
+            with leaving_touching_open():
+                length, bound, normal = _separating_translation(A, B, X_WA, X_WB, meeting)
         if certain:  # what separates the unions separates their deepest convex parts, too
             row["upper"] = min(0.0, float(meeting["upper"].min()))
         row["distance"], row["lower"] = min(0.0 - length, float(row["upper"])), 0.0 - bound

@@ -20,7 +20,7 @@ from collide.lowering.packed_convex import POINTS
 from collide.mesh.bvh import MeshTree
 from collide.narrowphase.bounds import PROMISE_CURVED, PROMISE_STORED
 from collide.narrowphase.convex_batches import convex_rows
-from collide.narrowphase.convex_kernel_calls import finish_distances, number_of_poses
+from collide.narrowphase.convex_kernel_calls import finish_distances, leaving_touching_open, number_of_poses
 from collide.narrowphase.facets.facet_kernel_calls import balls_farther, core_hits, farthest_gap, hull_rows
 from collide.narrowphase.facets.facet_queries import points_in_solid, surface_distances
 from collide.narrowphase.facets.facets_against_curved import facet_rows
@@ -394,7 +394,9 @@ def _write_overlap(
         def hits(A: Body, B: Body, X_WA, X_WB) -> np.ndarray:
             return curved_states(A, E, X_WA, X_WB) != APART
 
-        write_depth(row, point, separating_translation(A, E.outer, PA.X[0], PB.X[0], hulls, [], hits))
+        with leaving_touching_open():
+            translation = separating_translation(A, E.outer, PA.X[0], PB.X[0], hulls, [], hits)
+        write_depth(row, point, translation)
 
 
 def _facet_at(tree: MeshTree, X_WM: np.ndarray, point: np.ndarray) -> int:
