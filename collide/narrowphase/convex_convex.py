@@ -124,8 +124,12 @@ def _write_curved_gap(ordered, query, work, core, row, lower, upper):
     write_verdict(
         row, middle.high, max(low, lower), min(high, upper), argument, PROMISE_CURVED * ordered.size, query.limit
     )
+    # Where Newton's method ended early, the points share what they miss of the gap along the normal.
+    apart = sub(add(gap.b, pair.t), gap.a)
+    shift = scale(0.5, sub(apart, scale(middle.high + radius.high, gap.nhat)))
     p_WA, p_WB = vec3_at(pair.poses, pair.A.pose_at + 9), vec3_at(pair.poses, pair.B.pose_at + 9)
-    p_WAa, p_WBb = add(gap.a, add(scale(radius_a, gap.nhat), p_WA)), sub(add(gap.b, p_WB), scale(radius_b, gap.nhat))
+    p_WAa = add(add(gap.a, shift), add(scale(radius_a, gap.nhat), p_WA))
+    p_WBb = sub(add(sub(gap.b, shift), p_WB), scale(radius_b, gap.nhat))
     write_vectors(row, gap.nhat, p_WAa, p_WBb, ordered.flip)
     write_vertices(row, work.ids, core.n_vertices, ordered.flip)
     return True

@@ -148,8 +148,8 @@ def _settle_curved(rows, pairs, table: ShapeTable, poses: PoseTable, shape_of, *
 
 @contextmanager
 def leaving_touching_open() -> Iterator[None]:
-    """Within, this thread leaves pairs of curved sets open that touch within rounding: for searches that try places
-    where bodies just part. An open pair counts as a hit, so that no place is taken for free."""
+    """Within, pairs of curved sets touching within rounding stay open in this thread: searches try place after place
+    where bodies just part. An open pair counts as a hit, so no place is free by mistake."""
     before, _of_thread.leaves_touching_open = _of_thread.leaves_touching_open, True
     try:
         yield

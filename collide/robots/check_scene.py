@@ -55,6 +55,10 @@ BODY_INTS = 4
 # Doubles of a box: centre and half its sides.
 CENTRE, HALF = 0, 3
 BOX = 6
+#: Half a side [m] of the box of a body without end, in place of infinity: kernels turn boxes, and 0 · ∞ is no number. A
+#: row of a rotation has an entry of at least 0.5, so that a turned box still reaches 5e149 m, and nothing in the world
+#: is farther than 1e50 m; its square is finite.
+UNBOUNDED_HALF = 1e150
 # Words of a pair that is left to others: the configuration, a body, another body or −1 − a body around; and a double,
 # how far apart they are at least.
 OPEN_INTS, OPEN_LOWER = 4, 3

@@ -20,7 +20,7 @@ from collide.lowering.parts import Part, bounding_parts_of, parts_of
 from collide.lowering.shape_table import POSE, POSE_STRETCH, POSE_TERMS, ShapeTable, pose_table
 from collide.mesh.convex_surface import is_own_hull
 from collide.narrowphase.posed_pair import LEAST_SQUARE
-from collide.robots.check_scene import BODY_INTS, BOX, ROUNDINGS_OF_ROTATIONS, TWINS
+from collide.robots.check_scene import BODY_INTS, BOX, ROUNDINGS_OF_ROTATIONS, TWINS, UNBOUNDED_HALF
 from collide.shapes.compound import Compound
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.mesh import Mesh, corners_of_facets
@@ -28,10 +28,6 @@ from collide.shapes.shape import Shape, kept_with_shape
 
 #: Boxes are moved outwards by this share of all that went into them, far more than roundings are.
 _LEAST_SLACK = 2.0**-40
-#: Half a side [m] of the box of a body without end, in place of infinity: kernels turn boxes, and 0 · ∞ is no number. A
-#: row of a rotation has an entry of at least 0.5, so that a turned box still reaches 5e149 m, and nothing in the world
-#: is farther than 1e50 m; its square is finite.
-UNBOUNDED_HALF = 1e150
 #: Tables of shapes with attached objects that are kept with the tables of a setting, at most.
 _MAX_JOINED = 8
 

@@ -15,7 +15,8 @@ from collide.results import PAIR_DTYPE
 from collide.robots import check_scene as layout
 from collide.robots import motion_bounds as motions
 from collide.robots.bounding_spheres import SphereWorkspace
-from collide.robots.check_tables import UNBOUNDED_HALF, Setting, Surroundings
+from collide.robots.check_scene import UNBOUNDED_HALF
+from collide.robots.check_tables import Setting, Surroundings
 from collide.robots.field_walks import field_walks
 from collide.robots.mesh_questions import MeshQuestions
 from collide.robots.move_surroundings import FIELD_MOVED, SKEWED, move_surroundings

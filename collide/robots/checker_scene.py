@@ -207,13 +207,15 @@ class CheckerScene:
 
     def _allow(self, a: str, b: str) -> None:
         """Test a pair no more. Raises InvalidArgument."""
+        for argument, name in (("a", a), ("b", b)):
+            checks.text(f"RobotChecker.allow: {argument}", name)
+
         def change(read: Self) -> dict:
             setting = read.prepare()
             rules, filters, maps = setting.rules.allowing(a, b), setting.filters, setting.maps
             first = len(filters.allowed) - len(setting.objects)
             objects = {name: k for k, name in enumerate(read._objects, first)}
             for argument, name in (("a", a), ("b", b)):
-                checks.text(f"RobotChecker.allow: {argument}", name)
                 if not (name in objects or name in rules.numbers or name in self.robot.links):
                     unknown = f"no link, attached object or body is called {brief(name)}"
                     raise InvalidArgument(f"RobotChecker.allow: {argument}: {unknown}")

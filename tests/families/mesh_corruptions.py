@@ -115,7 +115,7 @@ def ask(rng: np.random.Generator, spoilt: Spoilt, *, deep: bool = False) -> Said
         wrong = wrong or f"collide says {hit}, swapped {turned}, exact arithmetic {truth}"
     r = distance(mesh, probe, X_WA, X_WB, signed=deep)
     if truth.distance is None:
-        if not r.lower <= 0.0 <= r.upper + 5e-324:
+        if not (r.lower <= 0.0 and (r.lower <= r.upper if deep else r.upper + 5e-324 >= 0.0)):
             wrong = wrong or f"distance says {r.lower} … {r.upper} of bodies that meet"
     elif not np.nextafter(r.lower, -np.inf) <= truth.distance <= np.nextafter(r.upper, np.inf):
         wrong = wrong or f"distance says {r.lower} … {r.upper}, exact arithmetic {truth.distance!r}"

@@ -48,7 +48,10 @@ def prepared_boxes() -> tuple[collide.Box, collide.Box]:
         (collide.collide, {"security_margin": 0.0, "check_poses": True, "threads": 1, "axes": None, "algorithm": None}),
         (
             collide.distance,
-            {"max_distance": math.inf, "signed": True, "check_poses": True, "threads": 1, "algorithm": None},
+            {
+                "max_distance": math.inf, "signed": True, "depth": "quick", "check_poses": True, "threads": 1,
+                "algorithm": None,
+            },
         ),
         (collide.contacts, {"margin": 0.0, "max_contacts": 8, "check_poses": True, "threads": 1}),
     ],
