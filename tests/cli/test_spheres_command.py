@@ -66,6 +66,7 @@ def test_a_urdf_with_spheres_encloses_the_links_and_keeps_the_rest(robot, tmp_pa
     assert "contains the collision geometry of arm: 2 links, proven" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_excess_and_total_are_kept(robot, capsys):
     assert main(["spheres", str(robot), "--excess", "5cm", "--json", "-"]) == 0
     made = json.loads(capsys.readouterr().out)

@@ -113,6 +113,7 @@ def test_normals_points_and_margins_beside_rounding(seed):
     assert apart > 11 and within > 33 and beyond > 22
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("kind", ("Cylinder", "Cone"))
 def test_booleans_and_distances_never_contradict_each_other(kind):
     """Hulls of 166 points all but touching round shapes: of some 2 pairs in 100, one search proved what the other

@@ -194,6 +194,7 @@ def test_more_spheres_exceed_less():
     assert upper == sorted(upper, reverse=True) and upper[-1] < 0.8 * upper[0]
 
 
+@pytest.mark.slow
 def test_known_best_covers_are_reached():
     # A square plate by four balls: quarters, each around its middle. A segment by n balls: equal parts.
     plate = collide.enclosing_spheres(collide.Box((2, 2, 0)), 4)
@@ -233,6 +234,7 @@ def refused(spheres, shape, match: str) -> None:
         spheres.verify(shape)
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("name", ["ring", "box", "capsule", "open"])
 def test_forged_covers_are_refused(name):
     shape = SOLIDS[name]

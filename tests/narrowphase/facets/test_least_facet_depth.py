@@ -53,6 +53,7 @@ def test_a_block_in_the_notch_of_an_l_comes_out_of_the_notch():
     checked(case, r, rng_of("notch"))
 
 
+@pytest.mark.slow
 def test_brackets_of_random_solids():
     rng = rng_of("least solids")
     angle = mesh_of(((1, 1, 0.1), (0, 0, 0)), ((0.1, 1, 1), (0.45, 0, 0.45)))
