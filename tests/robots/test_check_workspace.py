@@ -57,7 +57,7 @@ def test_states_and_words_are_numbers_of_their_own():
     words = [value for name, value in vars(layout).items() if name.isupper() and name not in (
         "BODY", "SKIP", "NODE_LINK", "MEASURE", "PART", "TURNED", "POSE", "POSE_SLOP", "POSE_STRETCH", "POSE_TERMS",
         "PRODUCT_SLOP", "HEADER", "LINK", "FIRST", "COUNT", "TWINS", "BODY_INTS", "CENTRE", "HALF", "BOX", "OPEN_INTS",
-        "OPEN_LOWER", "ROUNDINGS_OF_ROTATIONS",
+        "OPEN_LOWER", "ROUNDINGS_OF_ROTATIONS", "UNBOUNDED_HALF",
     )]
     assert sorted(words) == list(range(layout.HEADER))
     assert motions.ROUNDING + 1 == motions.MOTION_HEADER and motions.RESOLUTION + 1 == motions.ROUNDING

@@ -17,7 +17,7 @@ from naive import rng_of
 
 import collide
 from collide.adapters.peers import exact
-from collide.certificates.nearest_to_origin import _weights, nearest_to_origin
+from collide.certificates.nearest_to_origin import nearest_to_origin, weights_towards_origin
 from collide.lowering.parts import convex_set_of
 from collide.papers.hierarchies.hierarchy_queries import Walks, walk_body
 from collide.papers.hierarchies.run_walk import no_walks, run_walks
@@ -224,7 +224,7 @@ def common_point(A, B, X_WA, X_WB, pairs) -> list[Fraction]:
         [tuple(int((x - y) * scale) for x, y in zip(p, q)) for p, q in zip(corners_a, corners_b)]
     )
     rows = [tuple(int((x - y) * scale) for x, y in zip(corners_a[k], corners_b[k])) for k in carrier]
-    weights = [Fraction(w, total) for w in _weights(rows)]
+    weights = [Fraction(w, total) for w in weights_towards_origin(rows)]
     of_a, of_b = (
         [sum(w * corners[k][i] for w, k in zip(weights, carrier)) for i in range(3)]
         for corners in (corners_a, corners_b)
