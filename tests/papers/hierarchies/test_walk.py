@@ -243,7 +243,8 @@ def is_inside(body, X, point) -> bool:
 
 
 def test_planes_of_the_walk_are_certificates_by_substitution():
-    """The walk's plane stands in the certificate as it is; another one, or one for hits or meshes, is refused."""
+    """The walk's plane stands in the certificate as it is; another one is refused. A plane parts a mesh of the same
+    vertices as well, and none that meets A."""
     rng = np.random.default_rng(14)
     A, B = ball(rng, 60), ball(rng, 80)
     X_WA = np.array([turned(rng, 2.3) for _ in range(10)])
@@ -259,8 +260,9 @@ def test_planes_of_the_walk_are_certificates_by_substitution():
             with pytest.raises(collide.CertificateRefused):
                 collide.verify(A, B, X, EYE, found, certificate=(one._replace(pairs=(wrong,)),))
     mesh = collide.Mesh(B.points, B.hull.facets)
+    collide.verify(A, mesh, X, EYE, collide.distance(A, mesh, X, EYE), certificate=(one,))
     with pytest.raises(collide.CertificateRefused):
-        collide.verify(A, mesh, X, EYE, collide.distance(A, mesh, X, EYE), certificate=(one,))
+        collide.verify(A, mesh, EYE, EYE, collide.distance(A, mesh, EYE, EYE), certificate=(one,))
 
 
 def test_the_checking_mode_sees_what_is_wrong():
