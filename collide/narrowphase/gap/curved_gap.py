@@ -418,9 +418,11 @@ def _solve(M, m):
 def _proven(pair, A, B, f, h, p, q, n, t, size, unit, work):
     """The `CurvedGap` of a solution.   p, q : the placed features."""
     away = dd.neg_vec3(n)
-    if f.flat > 0 or h.flat > 0:
-        f, h = _within(pair, A, f, unit), _within(pair, B, h, unit)
-        p, q = _placed(pair, A, f, n, unit), _placed(pair, B, h, away, unit)
+    inner_f, inner_h = _within(pair, A, f, unit), _within(pair, B, h, unit)
+    if _is_moved(f, inner_f):
+        p = _placed(pair, A, inner_f, n, unit)
+    if _is_moved(h, inner_h):
+        q = _placed(pair, B, inner_h, away, unit)
     v = dd.sub_vec3(_plus(q.point, t), p.point)
     length = dd.sqrt(dd.inner(n, n))
     beyond = dd.add(_beyond(pair, A, p, n, unit, work), _beyond(pair, B, q, away, unit, work))
@@ -433,6 +435,12 @@ def _proven(pair, A, B, f, h, p, q, n, t, size, unit, work):
         is_proven, dd.scale(over, lower), dd.scale(over, upper), over * error + vanishing,
         divide(dd.leading(n), length.high), scale(over, dd.leading(p.point)), scale(over, dd.leading(q.point))
     )
+
+
+@kernel(inline=True)
+def _is_moved(f, g):
+    """Whether flat coordinates differ."""
+    return f.s.high != g.s.high or f.s.low != g.s.low or f.t.high != g.t.high or f.t.low != g.t.low
 
 
 @kernel
