@@ -123,7 +123,6 @@ def _swept_points(
     if len(corners) <= _MAX_UNSORTED:
         return SweptPoints([placed(k) for k in range(len(corners))], radius, *_topology(corners.tobytes()))
     triangles = np.array(_topology(corners.tobytes())[0], dtype=np.int64).reshape(-1, 3)
-    scale = 2.0**-units.length
     R = np.array([[float(Fraction(x, 1 << units.rotation)) for x in row] for row in pose.rows])
     size = np.abs(corners).sum(axis=1).max() + 1e-300
 
@@ -133,8 +132,7 @@ def _swept_points(
         heights = corners @ (R.T @ np.array([float(Fraction(x, length)) for x in m]))
         limit = heights.max()
         if least is not None:
-            at = least - inner(m, pose.p)
-            limit = min(limit, float(Fraction(at, length << units.rotation)) * scale)
+            limit = min(limit, float(Fraction(least - inner(m, pose.p), length << units.world)))
         return np.flatnonzero(heights >= limit - 1e-9 * size)
 
     def support(m: Vector) -> int:
