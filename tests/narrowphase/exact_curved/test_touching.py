@@ -128,12 +128,14 @@ def test_hulls_of_many_points_are_sorted_out_and_right(seed):
 
 def test_a_tiny_coordinate_beside_many_points_is_no_error():
     """With 5e-324 among the numbers units are 2^-1074: heights in such units are beyond doubles, and raised."""
-    points = np.random.default_rng(1).normal(size=(60, 3))
-    A, B = collide.ConvexHull(np.round(points * 2**16) / 2**16), collide.Cylinder(0.25, 0.5)
-    X_WA, X_WB = np.eye(4), collide.pose((6.0, 1.0, 0.5), quat_wxyz=(1, 0.2, 0.3, 0.4))
-    X_WA[0, 3] = 5e-324
+    rng = np.random.default_rng(1)
+    points = rng.normal(size=(60, 3))
+    points = np.round(points / np.linalg.norm(points, axis=1)[:, None] * 2**16) / 2**16
+    A, B = collide.ConvexHull(points), collide.Cylinder(0.25, 0.5)
+    X_WA, X_WB = np.eye(4), collide.pose((3.0, 1.0, 0.5), quat_wxyz=rng.normal(size=4))
     r = collide.distance(A, B, X_WA, X_WB)
     X_WB[:3, 3] -= r.distance * r.normal
+    X_WA[0, 3] = 5e-324
     pair = Pair(A, B, X_WA, X_WB, "tiny")
     known = bracket(A, B, X_WA, X_WB, depths=False)
     assert answered(pair).hit == known.hit
