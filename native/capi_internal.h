@@ -116,7 +116,7 @@ struct collide_workspace {
     int64_t *shape_of; /* 2 * BLOCK */
     int64_t *pairs;    /* BLOCK pairs of parts */
     collide_pair *rows;
-    int64_t steps[4]; /* addresses of what `settle_exactly` calls */
+    int64_t steps[3]; /* addresses of what `settle_exactly` calls */
     struct mesh_workspace *mesh;
     struct field_workspace *field;
     struct manifold_space *manifold; /* of contacts; NULL until some are asked for */

@@ -28,8 +28,7 @@ static void begin_header(collide_workspace *space)
     space->header[STEPS_AT] = address_of(space->steps);
     space->steps[0] = code_at(&space->kernels->settle_hulls);
     space->steps[1] = code_at(&space->kernels->settle_halfspaces);
-    space->steps[2] = code_at(&space->kernels->settle_faces);
-    space->steps[3] = code_at(&space->kernels->exact_depth);
+    space->steps[2] = code_at(&space->kernels->exact_depth);
     space->header[POSES_AT] = address_of(space->poses);
     space->header[SHAPE_OF_AT] = address_of(space->shape_of);
     space->header[PAIRS_AT] = address_of(space->pairs);

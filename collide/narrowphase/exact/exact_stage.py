@@ -19,17 +19,16 @@ import numpy as np
 
 from collide.kernels import address_of, code_of, entry, native_call, view_i64, view_u8
 from collide.lowering.shape_table import PoseTable, ShapeTable
-from collide.narrowphase.exact import exact_depth, settle_faces, settle_halfspaces, settle_hulls
+from collide.narrowphase.exact import exact_depth, settle_halfspaces, settle_hulls
 from collide.narrowphase.exact.settle_regions import settle_regions
 from collide.narrowphase.rows import HOW, ROW
 from collide.results import UNDECIDED
 
 _settle_hulls_at = native_call(settle_hulls.SIGNATURE)
 _settle_halfspaces_at = native_call(settle_halfspaces.SIGNATURE)
-_settle_faces_at = native_call(settle_faces.SIGNATURE)
 _exact_depth_at = native_call(exact_depth.SIGNATURE)
-#: Addresses of the four in `settle_exactly`'s list.
-_HULLS, _HALFSPACES, _FACES, _DEPTH, _CODES = range(5)
+#: Addresses of the three in `settle_exactly`'s list.
+_HULLS, _HALFSPACES, _DEPTH, _CODES = range(4)
 
 
 #: How `settle_exactly` is called.
@@ -53,24 +52,24 @@ def settle_exactly(
        cores to all digits, or double-doubles where rounding cannot tell (`face_height.py`). Depths below
        rounding come from the facets nearest the origin, as named by doubles (`depth_requests.py`, `plane_depth.py`).
     2. `settle_halfspaces`: a half-space against a convex set, the sign of a polynomial a vertex, or of a curved set's
-       reach; two half-spaces with opposite normals (`opposite_halfspaces.py`). Only if step 1 met a half-space.
-    3. `settle_faces`: a curved set on a flat face of another set, the same sign for the face's plane.
-    4. `exact_depth`: overlaps settled by step 1 without a depth, where depths are wanted and hulls are small: the
+       reach; two half-spaces with opposite normals (`opposite_halfspaces.py`); a curved set on a flat
+       face of another set, the same sign for the face's plane (`settle_faces.py`). Only if step 1 met such a pair.
+    3. `exact_depth`: overlaps settled by step 1 without a depth, where depths are wanted and hulls are small: the
        least extent over all candidate planes (`all_planes.py`).
 
-    codes : addresses of the four.   Other arguments as of `settle_hulls`. The steps are called where they were
+    codes : addresses of the three.   Other arguments as of `settle_hulls`. The steps are called where they were
     compiled, so that they are compiled once.
     """
     codes = view_i64(codes_at, _CODES)
     depths = depths and not boolean
-    n_halfspaces = _settle_hulls_at(
+    n_remaining = _settle_hulls_at(
         codes[_HULLS],
         (
             ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, depths, limit, rows_at, terms_at,
             n_terms, requests_at, digits_at,
         ),
     )
-    if n_halfspaces > 0:
+    if n_remaining > 0:
         _settle_halfspaces_at(
             codes[_HALFSPACES],
             (
@@ -78,13 +77,6 @@ def settle_exactly(
                 n_terms, digits_at,
             ),
         )
-    _settle_faces_at(
-        codes[_FACES],
-        (
-            ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, limit, rows_at, terms_at, n_terms,
-            digits_at,
-        ),
-    )
     if depths:
         _exact_depth_at(
             codes[_DEPTH],
@@ -102,10 +94,7 @@ def settle_exactly(
 @cache
 def step_codes() -> np.ndarray:
     """What `settle_exactly` calls, once it is needed."""
-    steps = (
-        settle_hulls.settle_hulls, settle_halfspaces.settle_halfspaces, settle_faces.settle_faces,
-        exact_depth.exact_depth,
-    )
+    steps = settle_hulls.settle_hulls, settle_halfspaces.settle_halfspaces, exact_depth.exact_depth
     return np.array([code_of(step) for step in steps])
 
 

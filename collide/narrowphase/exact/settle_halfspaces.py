@@ -1,14 +1,15 @@
-"""A step of the exact stage: rows of half-spaces against convex sets, whose signs or last digits doubles leave open."""
+"""A step of the exact stage: rows of half-spaces, and of curved sets on flat faces, that doubles leave open."""
 
 from __future__ import annotations
 
 import math
 
 from collide.kernels import entry, kernel, view_i64, view_u8
-from collide.lowering.packed_convex import HALFSPACE
+from collide.lowering.packed_convex import HALFSPACE, POINTS
 from collide.narrowphase.exact.exact_gjk import SEPARATE, TOUCHING, UNDONE
 from collide.narrowphase.exact.exact_halfspace import reach_plane_exactly
 from collide.narrowphase.exact.opposite_halfspaces import settle_opposite
+from collide.narrowphase.exact.settle_faces import settle_faces
 from collide.narrowphase.exact.settle_hulls import keep_proven_sign
 from collide.narrowphase.exact.settle_space import bracket_of_gap, settle_space
 from collide.narrowphase.halfspace_convex import reach_of_plane
@@ -24,7 +25,7 @@ SIGNATURE = "void(int64, int64, int64, int64, int64, int64, boolean, float64, in
 def settle_halfspaces(
     ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, limit, rows_at, terms_at, n_terms, digits_at
 ):
-    """Settle the undecided rows of half-spaces, in place.
+    """Settle the undecided rows of half-spaces, and of curved sets by flat faces, in place.
 
     Arguments as in `settle_hulls`, and flat as there.
     """
@@ -36,12 +37,14 @@ def settle_halfspaces(
             continue
         ordered = ordered_pair(ints_at, numbers_at, poses_at, shape_of_at, pairs[2 * k], pairs[2 * k + 1])
         pair = ordered.pair
-        if not (ordered.exact_numbers and pair.A.kind == HALFSPACE):
+        if not ordered.exact_numbers:
             continue
-        if pair.B.kind == HALFSPACE:
+        if pair.A.kind == HALFSPACE and pair.B.kind == HALFSPACE:
             settle_opposite(ordered, space, view_row(row_at))
-        else:
+        elif pair.A.kind == HALFSPACE:
             _settle(ordered, space, row_at, boolean, limit)
+        elif pair.A.kind != POINTS or pair.B.kind != POINTS:
+            settle_faces(ordered, space, row_at, boolean, limit)
 
 
 @kernel(inline=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from collide.kernels import entry, kernel, view_f64, view_i64, view_u8
-from collide.lowering.packed_convex import HALFSPACE, POINTS
+from collide.lowering.packed_convex import POINTS
 from collide.narrowphase.exact.depth_requests import REQUESTS, find_request
 from collide.narrowphase.exact.exact_gjk import (
     SEPARATE,
@@ -67,13 +67,13 @@ def settle_hulls(
     Arguments as in `settle_exactly`; without depths bodies that meet get a common point.   terms, n_terms : of the
     `PoseTable`.
     requests : written by `answer_pairs`.   digits : workspace of WORKSPACE integers.
-    Curved cores stay open, and shapes whose stored numbers are themselves rounded (slop).
+    Open stay shapes whose stored numbers are themselves rounded (slop).
     Arguments are flat: entries are called by address, from C too.
     """
     pairs = view_i64(pairs_at, 2 * n_pairs)
     space = settle_space(terms_at, n_terms, digits_at)
     requests = view_i64(requests_at, REQUESTS)
-    n_halfspaces = 0
+    n_remaining = 0
     for k in range(n_pairs):
         row_at = rows_at + ROW * k
         if view_u8(row_at, ROW)[HOW] != UNDECIDED:
@@ -81,11 +81,11 @@ def settle_hulls(
         ordered = ordered_pair(ints_at, numbers_at, poses_at, shape_of_at, pairs[2 * k], pairs[2 * k + 1])
         if not ordered.exact_numbers:
             continue
-        if ordered.pair.A.kind == HALFSPACE:
-            n_halfspaces += 1
-        elif ordered.pair.A.kind == POINTS and ordered.pair.B.kind == POINTS:
+        if ordered.pair.A.kind == POINTS and ordered.pair.B.kind == POINTS:
             _settle(ordered, space, requests, k, row_at, boolean, depths, limit)
-    return n_halfspaces
+        else:
+            n_remaining += 1
+    return n_remaining
 
 
 @kernel(inline=True)
