@@ -82,6 +82,17 @@ class CheckScene(NamedTuple):
 
 
 @kernel(inline=True)
+def skew_of(X):
+    """The sum of |RᵀR − 1| of a pose's matrix R."""
+    off = 0.0
+    for i in range(3):
+        for j in range(3):
+            dot = X[i] * X[j] + X[4 + i] * X[4 + j] + X[8 + i] * X[8 + j]
+            off += abs(dot - (1.0 if i == j else 0.0))
+    return off
+
+
+@kernel(inline=True)
 def view_scene(header_at):
     """The `CheckScene` of a header."""
     words = view_i64(header_at, HEADER)

@@ -34,6 +34,7 @@ from collide.robots.check_scene import (
     ROUNDINGS_OF_ROTATIONS,
     SHAPE_OF_AT,
     WALKS_AT,
+    skew_of,
 )
 
 #: A pose of a body, and of a part in its body: (4, 4).
@@ -91,12 +92,7 @@ def _is_same(A, B):
 @kernel(inline=True)
 def _is_skewed(X):
     """Whether the matrix of a pose is farther from a rotation than roundings are."""
-    off = 0.0
-    for i in range(3):
-        for j in range(3):
-            entry_of = X[i] * X[j] + X[4 + i] * X[4 + j] + X[8 + i] * X[8 + j]
-            off += abs(entry_of - (1.0 if i == j else 0.0))
-    return not off < ROUNDINGS_OF_ROTATIONS
+    return not skew_of(X) < ROUNDINGS_OF_ROTATIONS
 
 
 @kernel(inline=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collide.kernels import entry, kernel, view_f64
 from collide.lowering.compound_table import BALL, CENTRE, MEASURE, PART, TURNED
 from collide.numerics.vec3 import Vec3, put_vec3, vec3_at
-from collide.robots.check_scene import BOX, HALF, ROUNDINGS_OF_ROTATIONS, UNBOUNDED_HALF
+from collide.robots.check_scene import BOX, HALF, ROUNDINGS_OF_ROTATIONS, UNBOUNDED_HALF, skew_of
 from collide.robots.sphere_lanes import LESS_WITHIN, PADDED_RADIUS, RADIUS, SPHERE
 
 #: Boxes and radii are larger, or smaller, by this share of all that goes into them, far more than a dozen roundings.
@@ -21,7 +21,7 @@ def move_parts(X_at, rows_at, out_at, n, box_at):
     """
     X, rows = view_f64(X_at, 16), view_f64(rows_at, PART * n)
     out, box = view_f64(out_at, PART * n), view_f64(box_at, BOX)
-    skew = _skew(X)
+    skew = skew_of(X)
     is_turned = False
     for i in range(3):
         for j in range(4):
@@ -62,7 +62,7 @@ def move_spheres(X_at, rows_at, n, n_growing):
     moved them and by what the matrix may lengthen; the others lie within the body, and become smaller.
     """
     X, rows = view_f64(X_at, 16), view_f64(rows_at, SPHERE * n)
-    skew = _skew(X)
+    skew = skew_of(X)
     for k in range(n):
         at = SPHERE * k
         c = vec3_at(rows, at)
@@ -91,14 +91,3 @@ def _moved(X, p):
 @kernel(inline=True)
 def _sum_of(p):
     return abs(p.x) + abs(p.y) + abs(p.z)
-
-
-@kernel(inline=True)
-def _skew(X):
-    """The sum of |RᵀR − 1| of a pose's matrix R."""
-    off = 0.0
-    for i in range(3):
-        for j in range(3):
-            dot = X[i] * X[j] + X[4 + i] * X[4 + j] + X[8 + i] * X[8 + j]
-            off += abs(dot - (1.0 if i == j else 0.0))
-    return off
