@@ -51,6 +51,9 @@ PROMISE_CURVED = 2.0**-26
 #: facets get too thin to prove anything with, and one run in twenty ends at its cap.
 TOLERANCE_CURVED = 2.0**-36
 
+#: Where it stops first where last digits are asked for, which a coarse surface mostly proves (`gap/curved_depth.py`).
+COARSE_CURVED = 2.0**-18
+
 #: A tetrahedron that holds the origin this deep, in units of S, is a seed for EPA.
 WELL_CONDITIONED = 2.0**-10
 

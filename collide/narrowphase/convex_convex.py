@@ -76,8 +76,8 @@ def convex_convex(ordered, how, query, row, row_number, n_start, work):
     decided = lower > 0.0 or upper <= 0.0
     if core.deepest < math.inf:
         rounding = 4.0 * 2.0**-53 * radius
-        lower = max(lower, -core.deepest - radius - rounding)
-        upper = min(upper, -core.shallowest - radius + rounding)
+        lower = max(lower, dd.bracket(two_sum(-core.deepest, -radius), rounding).lower)
+        upper = min(upper, dd.bracket(two_sum(-core.shallowest, -radius), rounding).upper)
     width = math.inf
     if not query.boolean:
         width = PROMISE_CURVED * size if curved else (0.0 if exact_numbers else PROMISE_STORED * size)

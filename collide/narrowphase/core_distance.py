@@ -10,17 +10,25 @@ import math
 from typing import NamedTuple
 
 from collide.kernels import kernel
-from collide.narrowphase.bounds import GJK_ROUNDS, PROMISE_DEPTH, TOLERANCE_CURVED, WELL_CONDITIONED
+from collide.narrowphase.bounds import COARSE_CURVED, GJK_ROUNDS, PROMISE_DEPTH, TOLERANCE_CURVED, WELL_CONDITIONED
 from collide.narrowphase.epa.expand_polytope import FLAT, EpaResult, Goal, Seed, epa, facet_of, height_over
 from collide.narrowphase.epa.origin_foot import load_facet, weigh_nearest, weigh_origin
 from collide.narrowphase.epa.polytope_surface import number, surface_at
 from collide.narrowphase.epa.refine_depth import refine
+from collide.narrowphase.gap.curved_depth import refine_curved_depth
 from collide.narrowphase.gjk.gjk import APART, ENCLOSED, NEAREST, gjk
-from collide.narrowphase.gjk.minkowski_difference import AXIS, NEAREST_POINT, POINT, weighted_sum
+from collide.narrowphase.gjk.minkowski_difference import (
+    AXIS,
+    NEAREST_POINT,
+    POINT,
+    POINT_OF_A,
+    POINT_OF_B,
+    weighted_sum,
+)
 from collide.narrowphase.gjk.simplex import nearest_of_all, weigh_enclosed
 from collide.narrowphase.shallow_cylinders import is_cylinder_pair, shallow_cylinders
 from collide.narrowphase.shallow_ellipsoids import NOTHING, is_ellipsoid_pair, shallow_ellipsoids
-from collide.numerics.vec3 import Vec3, add, neg, norm, norm1, scale, sub, vec3_at
+from collide.numerics.vec3 import Vec3, add, neg, norm, norm1, put_vec3, scale, sub, vec3_at
 
 #: A weighted point is the foot on a plane if it misses that by no more, in units of the pair's size.
 _NEAR_MISS = 2.0**-48
@@ -72,7 +80,11 @@ def convex_cores(ordered, query, work, radius, error, curved, n_start):
         shallow = _shallow_depth(pair, work, ordered.size)
         if shallow.is_proven:
             depth, proven, nhat = shallow.depth, shallow.proven, shallow.nhat
-            return CoreDistance(depth, -depth, -proven, -math.inf, math.inf, nhat, 1, 1, shallow.iterations)
+            core = CoreDistance(depth, -depth, -proven, -math.inf, math.inf, nhat, 1, 1, shallow.iterations)
+            if query.resumes or not ordered.exact_numbers:
+                return core
+            surface = surface_at(work.epa_at, work.epa_integers_at)
+            return _refined(core, refine_curved_depth(ordered, work, 1, False, nhat, surface, 0, error), work, error)
     # Of polytopes at rest the last digits tell the normal (`gap/refine_gap.py`); a motion tries axes between this one
     # and the last where it is a poor one.
     axis_from = 0.125 if query.resumes else 0.0 if curved else math.inf
@@ -97,6 +109,24 @@ def convex_cores(ordered, query, work, radius, error, curved, n_start):
 
 
 @kernel(inline=True)
+def _by_epa(ordered, query, work, run, upper, radius, error, curved):
+    """The `CoreDistance` of cores that GJK could not separate.   run : its result.   upper : of the signed distance.
+
+    Depths of curved cores begin with a coarse surface, mostly enough to prove the last digits.
+    """
+    size = ordered.size
+    is_refined = curved and query.depths and ordered.exact_numbers and not query.resumes
+    tolerance = (COARSE_CURVED if is_refined else TOLERANCE_CURVED) * size if curved else 0.25 * error
+    while True:
+        core = _by_surface(ordered, query, work, run, upper, radius, error, curved, is_refined, tolerance)
+        is_narrow = core.deepest - core.shallowest <= PROMISE_DEPTH * (core.depth + radius)
+        if not is_refined or is_narrow or tolerance < COARSE_CURVED * size:
+            return core
+        tolerance = TOLERANCE_CURVED * size
+        _take_simplex(work)
+
+
+@kernel(inline=True)
 def _normal_of_gap(v, distance, nhat, tolerance):
     """The direction along which curved cores are proven apart, if their nearest points can be moved onto its line.
 
@@ -107,6 +137,20 @@ def _normal_of_gap(v, distance, nhat, tolerance):
     if not distance > 0.0 or norm(add(v, scale(distance, nhat))) <= tolerance:
         return nhat
     return scale(-1.0 / distance, v)
+
+
+@kernel(inline=True)
+def _refined(core, fine, work, error):
+    """The `CoreDistance` with the last digits of a `CurvedDepth`, if that proves more; its points become point 0."""
+    if not (fine.is_proven and fine.upper - fine.lower < core.upper - core.lower + 2.0 * error):
+        return core
+    put_vec3(work.points, POINT_OF_A, fine.a)
+    put_vec3(work.points, POINT_OF_B, fine.b)
+    work.weights[0] = 1.0
+    depth = 0.5 * (fine.lower + fine.upper)
+    return CoreDistance(
+        depth, core.lower, core.upper, fine.lower, fine.upper, fine.nhat, 1, core.n_vertices, core.iterations
+    )
 
 
 @kernel
@@ -120,14 +164,13 @@ def _shallow_depth(pair, work, size):
 
 
 @kernel(inline=True)
-def _by_epa(ordered, query, work, run, upper, radius, error, curved):
-    """The `CoreDistance` of cores that GJK could not separate.   run : its result.   upper : of the signed distance."""
+def _by_surface(ordered, query, work, run, upper, radius, error, curved, is_refined, tolerance):
+    """`_by_epa` with a surface grown until the bracket is as narrow as ``tolerance``."""
     pair, size = ordered.pair, ordered.size
     points, weights, ids = work.points, work.weights, work.ids
     exact_numbers = ordered.exact_numbers and not curved
     enclosed = run.status == ENCLOSED
     n = run.n_points
-    tolerance = TOLERANCE_CURVED * size if curved else 0.25 * error
     polytope = surface_at(work.epa_at, work.epa_integers_at)
     use_capped_tetrahedron = query.depths and not curved and pair.A.n + pair.B.n > _MAX_VERTICES_FOR_GJK_SEED
     well_conditioned = enclosed and run.clearance > WELL_CONDITIONED * size
@@ -164,7 +207,8 @@ def _by_epa(ordered, query, work, run, upper, radius, error, curved):
         # few vertices: `exact_depth.py` tries all planes instead
         if refined.sound or not use_capped_tetrahedron or start == _MAX_STARTS:
             break
-    miss = _weigh_foot(work, polytope, result, has_points, not enclosed, curved, tolerance, size, error)
+    with_ids = is_refined or not enclosed
+    miss = _weigh_foot(work, polytope, result, has_points, with_ids, curved, tolerance, size, error)
     of_gjk = abs(result.depth) + (0.0 if enclosed else upper)  # what GJK's last simplex may miss the foot by
     if result.clearance > error:
         upper = min(upper, -result.clearance)
@@ -174,7 +218,14 @@ def _by_epa(ordered, query, work, run, upper, radius, error, curved):
         if enclosed:
             _weigh_enclosed(work)
         return CoreDistance(result.depth, lower, upper, shallowest, deepest, result.nhat, n, n, iterations)
-    return CoreDistance(result.depth, lower, upper, shallowest, deepest, result.nhat, 3, n_vertices, iterations)
+    core = CoreDistance(result.depth, lower, upper, shallowest, deepest, result.nhat, 3, n_vertices, iterations)
+    if is_refined:
+        n_facets = result.n_facets if result.clearance > error else 0
+        fine = refine_curved_depth(ordered, work, 3, True, result.nhat, polytope, n_facets, error)
+        if enclosed:
+            _take_vertices(work)
+        core = _refined(core, fine, work, error)
+    return core
 
 
 @kernel(inline=True)
@@ -195,6 +246,11 @@ def _take_simplex(work):
         work.points[k] = work.simplex[k]
     for k in range(4):
         work.weights[k] = work.simplex[4 * POINT + k]
+    _take_vertices(work)
+
+
+@kernel(inline=True)
+def _take_vertices(work):
     for k in range(8):
         work.ids[k] = int(work.simplex[4 * POINT + 4 + k])
 

@@ -8,6 +8,8 @@ from typing import NamedTuple
 from collide.kernels import kernel, view_f64, view_i64
 from collide.lowering.packed_convex import POINTS
 from collide.narrowphase.bounds import ERROR
+from collide.narrowphase.gap.curved_features import ERROR as CURVED_ERROR
+from collide.narrowphase.gap.curved_features import curved_reach, turned_back
 from collide.narrowphase.gap.precise_pair import HEIGHT_ERROR, add_products, is_composed, is_refinable, unit_scale
 from collide.narrowphase.gap.tied_vertices import MAX_TIES, tied_vertices, vertices_of
 from collide.narrowphase.posed_pair import radius_of
@@ -31,6 +33,9 @@ from collide.numerics.vec3 import (
 )
 from collide.results import FORMULA, UNDECIDED
 from collide.support.support_mapping import settled_vertex, support
+
+#: Between which lengths of a normal double-doubles neither overflow nor vanish.
+_LEAST, _MOST = 2.0**-300, 2.0**300
 
 
 class Plane(NamedTuple):
@@ -131,8 +136,11 @@ def halfspace_convex(ordered, query, row, work):
     upper = gap + error
     decided = lower > 0.0 or upper <= 0.0
     exact_numbers = ordered.exact_numbers and pair.B.kind == POINTS
-    if exact_numbers and lower <= query.limit and not query.boolean:
-        refined = refine_height(pair, work.fine_at, work.ties_at, coarse.vertex, coarse.size, error, coarse.skew)
+    if ordered.exact_numbers and lower <= query.limit and not query.boolean:
+        if exact_numbers:
+            refined = refine_height(pair, work.fine_at, work.ties_at, coarse.vertex, coarse.size, error, coarse.skew)
+        else:
+            refined = refine_curved_height(pair, work.fine_at, coarse.size, coarse.skew)
         if refined.proven:
             bracket = dd.bracket(dd.sub(refined.height, DD(radius_of(pair, pair.B), 0.0)), refined.error)
             gap = bracket.nearest
@@ -191,6 +199,23 @@ class RefinedHeight(NamedTuple):
 
 
 @kernel
+def refine_curved_height(pair, doubles_at, size, skew):
+    """`refine_height` of a cylinder, cone or ellipsoid, by its reach along the normal."""
+    B, poses = pair.B, pair.poses
+    p, q = pair.A.pose_at, B.pose_at
+    plane = view_f64(doubles_at, 8)
+    _put_fine_plane(pair, plane)
+    normal = dd.vec3_at(plane, 0)
+    length = dd.sqrt(dd.inner(normal, normal))
+    if is_composed(poses, p) or is_composed(poses, q) or not (is_refinable(size) and _LEAST < length.high < _MOST):
+        return RefinedHeight(False, DD(0.0, 0.0), 0.0)
+    reach = curved_reach(pair, B, turned_back(poses, q, dd.neg_vec3(normal)), 1.0)
+    height = dd.sub(dd.inner(dd.difference(vec3_at(poses, q + 9), vec3_at(poses, p + 9)), normal), reach)
+    distance = dd.div(dd.sub(height, DD(plane[6], plane[7])), length)
+    return RefinedHeight(True, distance, 8.0 * skew * CURVED_ERROR / unit_scale(size))
+
+
+@kernel
 def refine_height(pair, doubles_at, ties_at, vertex, size, error, skew):
     """The signed distance of B's core from a half-space A, to its last digit.
 
@@ -207,7 +232,7 @@ def refine_height(pair, doubles_at, ties_at, vertex, size, error, skew):
     _put_fine_plane(pair, plane)
     normal = dd.vec3_at(plane, 0)
     length = dd.sqrt(dd.inner(normal, normal))
-    if not (2.0**-300 < length.high < 2.0**300):
+    if not (_LEAST < length.high < _MOST):
         return RefinedHeight(False, DD(0.0, 0.0), 0.0)
     g = rotate_back(poses, q, divide(dd.leading(normal), length.high))
     ties[0] = vertex

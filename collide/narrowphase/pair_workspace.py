@@ -8,6 +8,7 @@ from collide.kernels import kernel, view_f64, view_i64
 from collide.narrowphase.epa.polytope_surface import DOUBLES as EPA_DOUBLES
 from collide.narrowphase.epa.polytope_surface import INTEGERS as EPA_INTEGERS
 from collide.narrowphase.exact.depth_requests import ENTRY, REQUESTS
+from collide.narrowphase.gap.curved_features import DOUBLES as CURVED_DOUBLES
 from collide.narrowphase.gap.gap_queue import QUEUE_DOUBLES, QUEUE_INTEGERS
 from collide.narrowphase.gap.precise_pair import LOW_PARTS_OF_PAIR
 from collide.narrowphase.gap.tied_vertices import MAX_TIES
@@ -16,13 +17,14 @@ from collide.numerics.double_double import STRIDE
 from collide.numerics.exact_dot_sign import PRODUCT_TERMS
 
 # Workspace of one thread, in doubles: difference points and their weights; GJK's simplex, while EPA goes on from it;
-# last digits of depths and heights (four points, a direction, low parts of two poses); EPA's; the queue of gaps.
+# last digits of depths and heights (four points, a direction, low parts of two poses; or a step of Newton's method);
+# EPA's; the queue of gaps.
 _WEIGHTS_AT = 5 * POINT
 _SIMPLEX_AT = 64
 #: Of a simplex: four points, their weights, a vertex of A and of B of each.
 SIMPLEX = 4 * POINT + 4 + 8
 _FINE_AT = _SIMPLEX_AT + SIMPLEX
-_EPA_DOUBLES_AT = _FINE_AT + 5 * STRIDE + LOW_PARTS_OF_PAIR
+_EPA_DOUBLES_AT = _FINE_AT + max(5 * STRIDE + LOW_PARTS_OF_PAIR, CURVED_DOUBLES)
 _QUEUE_DOUBLES_AT = _EPA_DOUBLES_AT + EPA_DOUBLES
 DOUBLES = _QUEUE_DOUBLES_AT + QUEUE_DOUBLES
 # In integers: vertex pairs of the difference points; of the nearest facet; ties, or the terms of a sum; one request to

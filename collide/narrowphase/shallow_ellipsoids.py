@@ -146,6 +146,12 @@ def _rolling_ball(pair, body):
 
 
 @kernel(inline=True)
+def rolling_radius(pair, body):
+    """Radius of a ball that rolls inside an ellipsoid [m]; 0 of other bodies."""
+    return _rolling_ball(pair, body).radius if body.kind == ELLIPSOID else 0.0
+
+
+@kernel(inline=True)
 def _support_of(square, n):
     """(the ellipsoid's point farthest along n, its height): good enough to search with."""
     v = _times(square, n)

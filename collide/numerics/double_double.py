@@ -240,6 +240,18 @@ def sub_vec3(a, b):
 
 
 @kernel(inline=True)
+def add_vec3(a, b):
+    """a + b, each component to a relative 3u²."""
+    return DDVec3(add(a.x, b.x), add(a.y, b.y), add(a.z, b.z))
+
+
+@kernel(inline=True)
+def times_vec3(s, a):
+    """A double-double times a."""
+    return DDVec3(mul(s, a.x), mul(s, a.y), mul(s, a.z))
+
+
+@kernel(inline=True)
 def select_vec3(condition, a, b):
     return DDVec3(dd_select(condition, a.x, b.x), dd_select(condition, a.y, b.y), dd_select(condition, a.z, b.z))
 
@@ -265,6 +277,18 @@ def inner(a, b):
     """a·b, to 2⁻¹⁰¹·Σ|products|."""
     total = unnormalized_inner(a, b)
     return two_sum(total.high, total.low)
+
+
+@kernel(inline=True)
+def inner_vec3(a, x):
+    """a·x for a `Vec3` a of doubles, as `inner`."""
+    total, rest = two_product(a.x, x.x.high)
+    second, third = two_product(a.y, x.y.high), two_product(a.z, x.z.high)
+    total, error = two_sum(total, second.high)
+    rest += error + second.low
+    total, error = two_sum(total, third.high)
+    rest += (error + third.low) + (a.x * x.x.low + a.y * x.y.low + a.z * x.z.low)
+    return two_sum(total, rest)
 
 
 @kernel(inline=True)
