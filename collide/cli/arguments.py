@@ -201,7 +201,7 @@ def _add_report(commands) -> None:
     _scene_arguments(parser)
     _motion_arguments(parser)
     _clearance_argument(parser)
-    _ignore_argument(parser)
+    _pair_arguments(parser)
     parser.add_argument("--all", action="store_true", help="every pair, mesh and note, and what --proofs shows")
     parser.add_argument("--proofs", action="store_true",
                         help="how each answer is known, which pairs were never tested, and what took how long")
@@ -216,7 +216,7 @@ def _add_view(commands) -> None:
     _scene_arguments(parser)
     _motion_arguments(parser)
     _clearance_argument(parser)
-    _ignore_argument(parser)
+    _pair_arguments(parser)
     cli_view.add_arguments(parser)
 
 
@@ -238,7 +238,7 @@ def _add_check(commands) -> None:
                         help="with --missing-meshes skip: free counts although what was skipped is not checked")
     parser.add_argument("--touching-is-collision", action="store_true",
                         help="count pairs that touch within rounding as collisions")
-    _ignore_argument(parser)
+    _pair_arguments(parser)
     group = parser.add_argument_group("continuous integration")
     group.add_argument("--baseline", metavar="FILE",
                        help="known collisions, from --write-baseline or --json: only new ones count")
@@ -298,9 +298,12 @@ def _motion_arguments(parser: argparse.ArgumentParser) -> None:
                        help="no joint moves more between two samples of it: radians, or metres (0.02)")
 
 
-def _ignore_argument(parser: argparse.ArgumentParser) -> None:
+def _pair_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--ignore", action="append", default=[], metavar="A,B",
                         help="do not test this pair of bodies; may be given again, and the report says so")
+    parser.add_argument("--depth", choices=("quick", "least"), default="quick",
+                        help="least: search the shortest way out of overlapping meshes and unions, some 0.5 s a pair "
+                             "(quick: a way out)")
 
 
 def _output_arguments(parser: argparse.ArgumentParser) -> None:

@@ -27,7 +27,9 @@ def reports(args, progress: Callable, started: float | None, **limits) -> list:
     for label, scene in scenes:
         if trajectory is not None:
             scene = at_start(scene, trajectory)
-        state_report, watch = report.make(scene, progress=progress, started=started, ignore=ignore, **limits), None
+        state_report, watch = report.make(
+            scene, progress=progress, started=started, ignore=ignore, depth=args.depth, **limits
+        ), None
         if trajectory is not None:
             tested = report.without(scene, ignore)
             watch = watched(

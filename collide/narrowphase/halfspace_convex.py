@@ -35,7 +35,7 @@ from collide.results import FORMULA, UNDECIDED
 from collide.support.support_mapping import settled_vertex, support
 
 #: Between which lengths of a normal double-doubles neither overflow nor vanish.
-_LEAST, _MOST = 2.0**-300, 2.0**300
+_SMALLEST, _LARGEST = 2.0**-300, 2.0**300
 
 
 class Plane(NamedTuple):
@@ -207,7 +207,8 @@ def refine_curved_height(pair, doubles_at, size, skew):
     _put_fine_plane(pair, plane)
     normal = dd.vec3_at(plane, 0)
     length = dd.sqrt(dd.inner(normal, normal))
-    if is_composed(poses, p) or is_composed(poses, q) or not (is_refinable(size) and _LEAST < length.high < _MOST):
+    is_in_range = is_refinable(size) and _SMALLEST < length.high < _LARGEST
+    if is_composed(poses, p) or is_composed(poses, q) or not is_in_range:
         return RefinedHeight(False, DD(0.0, 0.0), 0.0)
     reach = curved_reach(pair, B, turned_back(poses, q, dd.neg_vec3(normal)), 1.0)
     height = dd.sub(dd.inner(dd.difference(vec3_at(poses, q + 9), vec3_at(poses, p + 9)), normal), reach)
@@ -232,7 +233,7 @@ def refine_height(pair, doubles_at, ties_at, vertex, size, error, skew):
     _put_fine_plane(pair, plane)
     normal = dd.vec3_at(plane, 0)
     length = dd.sqrt(dd.inner(normal, normal))
-    if not (_LEAST < length.high < _MOST):
+    if not (_SMALLEST < length.high < _LARGEST):
         return RefinedHeight(False, DD(0.0, 0.0), 0.0)
     g = rotate_back(poses, q, divide(dd.leading(normal), length.high))
     ties[0] = vertex

@@ -17,6 +17,7 @@ import collide
 from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.kernels import mode
+from collide.narrowphase.known_depth import Depth
 from collide.reports import classes, overlap_volumes, proofs
 from collide.reports import mesh_notes as meshes
 from collide.reports.number_format import brief_length, count
@@ -116,7 +117,7 @@ class Report:
 
 def make(
     scene, clearance: float = 0.0, min_depth: float = 0.0, progress=None, started: float | None = None,
-    ignore: Iterable[tuple[str, str]] = (),
+    ignore: Iterable[tuple[str, str]] = (), depth: Depth = "quick",
 ) -> Report:
     """Test a scene and sort what was found.
 
@@ -128,6 +129,7 @@ def make(
     progress : called with a label, gives a context manager around long work (`progress.Progress`).
     started : ``time.perf_counter()`` when the user's command began; the total counts from there.
     ignore : pairs of bodies, by name, that are not tested: the report says so.
+    depth : "least" to search the shortest way out of overlapping unions and solids, as of `collide.distance`.
 
     Raises
     ------
@@ -141,7 +143,8 @@ def make(
     start = time.perf_counter()
     with (progress or silent)("testing the scene"):
         sizes = classes.body_sizes(scene.bodies)
-        world, result, unanswered = _ask(scene, max(clearance, float(classes.roundings(sizes, 0.0).max(initial=0.0))))
+        limit = max(clearance, float(classes.roundings(sizes, 0.0).max(initial=0.0)))
+        world, result, unanswered = _ask(scene, limit, depth)
     tested = time.perf_counter()
     stats = world.stats
     names = world.names
@@ -155,7 +158,9 @@ def make(
     }
     report = Report(
         scene=_scene(scene),
-        query={"clearance": clearance, "min_depth": min_depth, "ignored": [list(pair) for pair in ignored]},
+        query={
+            "clearance": clearance, "min_depth": min_depth, "depth": depth, "ignored": [list(pair) for pair in ignored]
+        },
         pairs=_pairs(stats),
         colliding=by_class[classes.COLLIDING],
         shallow=by_class[classes.SHALLOW],
@@ -191,11 +196,11 @@ def _known_pair(scene, pair) -> tuple[str, str]:
     return a, b
 
 
-def _ask(scene, limit: float):
+def _ask(scene, limit: float, depth: Depth):
     """(world, its distances up to a limit [m], near pairs without an answer as data)."""
     world = scene.world()
     try:
-        return world, world.distances(max_distance=limit), []
+        return world, world.distances(max_distance=limit, depth=depth), []
     except UnsupportedQuery:
         refused = world.unanswerable(max_distance=limit)
         if not refused:
@@ -204,7 +209,7 @@ def _ask(scene, limit: float):
         world.allow(a, b, reason=UNANSWERED)
     names = world.names
     unanswered = [{"a": names[a], "b": names[b], "why": why} for a, b, why in refused]
-    return world, world.distances(max_distance=limit), unanswered
+    return world, world.distances(max_distance=limit, depth=depth), unanswered
 
 
 # --- everything around the pairs ----------------------------------------------------------------

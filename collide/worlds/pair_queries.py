@@ -15,6 +15,8 @@ from collide.base.lazy_modules import lazy_module
 from collide.base.threads import check_threads
 from collide.certificates.make_certificate import certify
 from collide.contact.contact_rows import CONTACT_DTYPE, WorldContacts, no_rows
+from collide.narrowphase.known_depth import Depth
+from collide.pairs.least_depths import checked_depth, shorten_depths
 from collide.pairs.security_margin import checked_margin, within
 from collide.results import PAIR_DTYPE, WorldResult
 from collide.worlds.minimum import nearest_pair
@@ -71,12 +73,14 @@ class WorldPairs(WorldScene):
         with self._pack() as packed:
             return bool(np.count_nonzero(self._answer(packed, started, margin, threads, boolean=True)))
 
-    def collisions(self, *, threads: int = 1) -> WorldResult:
+    def collisions(self, *, threads: int = 1, depth: Depth = "quick") -> WorldResult:
         """Every hitting pair with its depth.
 
         Parameters
         ----------
         threads : at most so many answer; the answers are the same bits.
+        depth : "least" to search the shortest translation of overlapping unions and solids, as of `collide.distance`:
+            one pair after another, 30 ms to 2 s each.
 
         Returns
         -------
@@ -87,17 +91,20 @@ class WorldPairs(WorldScene):
         ------
         UnsupportedQuery : for pairs that `collide.distance` does not answer; `unanswerable` names them.
         """
-        started, threads = time.perf_counter(), check_threads(threads)
+        started, threads, least = time.perf_counter(), check_threads(threads), checked_depth(depth)
         with self._pack() as packed:
-            return _result(packed, self._answer(packed, started, 0.0, threads))
+            return _result(packed, self._answer(packed, started, 0.0, threads), least)
 
-    def distances(self, max_distance: float = math.inf, *, threads: int = 1) -> WorldResult:
+    def distances(
+        self, max_distance: float = math.inf, *, threads: int = 1, depth: Depth = "quick"
+    ) -> WorldResult:
         """Every tested pair at most ``max_distance`` apart, hits included.
 
         Parameters
         ----------
         max_distance : [m], ≥ 0; infinity for all pairs. Margins of bodies and pairs have no say.
         threads : at most so many answer; the answers are the same bits.
+        depth : as of `collisions`.
 
         Returns
         -------
@@ -111,9 +118,9 @@ class WorldPairs(WorldScene):
         them.
         """
         limit = checks.limit("World.distances: max_distance", max_distance)
-        started, threads = time.perf_counter(), check_threads(threads)
+        started, threads, least = time.perf_counter(), check_threads(threads), checked_depth(depth)
         with self._pack() as packed:
-            return _result(packed, self._answer(packed, started, limit, threads, margins=False))
+            return _result(packed, self._answer(packed, started, limit, threads, margins=False), least)
 
     def minimum(self, max_distance: float = math.inf, *, threads: int = 1) -> WorldResult:
         """The tested pair of least signed distance, of several pairs with the least ids.
@@ -292,8 +299,10 @@ def _contacts(packed: PackedWorld, margin: float, max_contacts: int, threads: in
     return WorldContacts(rows, packed.bodies_named(pairs[counts > 0]))
 
 
-def _result(packed: PackedWorld, rows: np.ndarray) -> WorldResult:
-    """Of rows whose a and b are positions, in place."""
+def _result(packed: PackedWorld, rows: np.ndarray, least: bool = False) -> WorldResult:
+    """Of rows whose a and b are positions, in place.   least : search the least depths known."""
+    if least:
+        shorten_depths(rows, *packed.posed_shapes(np.stack((rows["a"], rows["b"]), axis=1)))
     return WorldResult(rows, packed.to_ids(rows), certify)
 
 

@@ -36,7 +36,7 @@ def fake_scene(*rows):
         "gjk_iterations": 0, "epa_iterations": 0, "seconds": {"narrowphase": 0.0},
     }
     world = SimpleNamespace(
-        distances=lambda max_distance: WorldResult(
+        distances=lambda max_distance, depth: WorldResult(
             answers[answers["hit"] | (answers["distance"] <= max_distance)],
             {k: SimpleNamespace(name=name) for k, name in names.items()},
             collide.certify,

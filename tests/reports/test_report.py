@@ -68,7 +68,7 @@ def make_scene(rows=ROWS, names=NAMES):
     }
     stacked = np.array(rows, PAIR_DTYPE) if rows else np.zeros(0, PAIR_DTYPE)
     world = SimpleNamespace(
-        distances=lambda max_distance: WorldResult(
+        distances=lambda max_distance, depth: WorldResult(
             stacked[stacked["hit"] | (stacked["distance"] <= max_distance)],
             {k: SimpleNamespace(name=name) for k, name in names.items()},
             collide.certify,

@@ -196,10 +196,10 @@ def test_pairs_without_an_answer_are_noted_once_and_left_out(monkeypatch, is_kno
     scene = slider_scene()
     real = collide.World.distances
 
-    def refusing(world, max_distance):
+    def refusing(world, max_distance, **asked):
         if not world.allowed:
             raise UnsupportedQuery("no way")
-        return real(world, max_distance)
+        return real(world, max_distance, **asked)
 
     def refused(world, max_distance):
         ids = {name: identity for identity, name in world.names.items()}
