@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -20,6 +20,8 @@ from collide.shapes.shape import Shape
 #: Loaded when a least depth is first asked for.
 of_unions = lazy_module("collide.narrowphase.composite.least_depth")
 of_facets = lazy_module("collide.narrowphase.facets.least_facet_depth")
+#: How depths of bodies that are not convex are searched.
+DepthSearch = Literal["quick", "least"]
 _DEPTHS = {"quick": False, "least": True}
 
 

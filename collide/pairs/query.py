@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Literal, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from collide.narrowphase.convex_kernel_calls import finish_distances
 from collide.narrowphase.dispatch import REFUSED, Method, method_of
 from collide.narrowphase.single_queries import asks_prepared_pairs
 from collide.pairs.batches import answer_batch, length_of, prepare_pair
-from collide.pairs.least_depths import checked_depth, shorten_depths
+from collide.pairs.least_depths import DepthSearch, checked_depth, shorten_depths
 from collide.pairs.optional_algorithms import named_algorithm
 from collide.pairs.pair_arguments import asked_poses, pose_at, shape_at
 from collide.pairs.security_margin import checked_margin, within
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from collide.transforms import Pose, PoseLike
 
     Shapes = Shape | Sequence[Shape]
-    Depth = Literal["quick", "least"]
 
 
 @overload
@@ -163,12 +162,12 @@ def _with_axes(A, B, X_WA, X_WB, check_poses: bool, threads: int, axes):
 @overload
 def distance(
     A: Shape, B: Shape, X_WA: Pose, X_WB: Pose, *, max_distance: float = ..., signed: bool = ...,
-    check_poses: bool = ..., threads: int = ..., algorithm: str | None = ..., depth: Depth = ...,
+    check_poses: bool = ..., threads: int = ..., algorithm: str | None = ..., depth: DepthSearch = ...,
 ) -> PairResult[Single]: ...
 @overload
 def distance(
     A: Shapes, B: Shapes, X_WA: PoseLike, X_WB: PoseLike, *, max_distance: float = ..., signed: bool = ...,
-    check_poses: bool = ..., threads: int = ..., algorithm: str | None = ..., depth: Depth = ...,
+    check_poses: bool = ..., threads: int = ..., algorithm: str | None = ..., depth: DepthSearch = ...,
 ) -> PairResult: ...
 @asks_prepared_pairs(prepare_pair, PairResult, certify)
 def distance(

@@ -10,6 +10,7 @@ import platform
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 
@@ -17,7 +18,6 @@ import collide
 from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.kernels import mode
-from collide.narrowphase.known_depth import Depth
 from collide.reports import classes, overlap_volumes, proofs
 from collide.reports import mesh_notes as meshes
 from collide.reports.number_format import brief_length, count
@@ -117,7 +117,7 @@ class Report:
 
 def make(
     scene, clearance: float = 0.0, min_depth: float = 0.0, progress=None, started: float | None = None,
-    ignore: Iterable[tuple[str, str]] = (), depth: Depth = "quick",
+    ignore: Iterable[tuple[str, str]] = (), depth: Literal["quick", "least"] = "quick",
 ) -> Report:
     """Test a scene and sort what was found.
 
@@ -196,7 +196,7 @@ def _known_pair(scene, pair) -> tuple[str, str]:
     return a, b
 
 
-def _ask(scene, limit: float, depth: Depth):
+def _ask(scene, limit: float, depth: Literal["quick", "least"]):
     """(world, its distances up to a limit [m], near pairs without an answer as data)."""
     world = scene.world()
     try:

@@ -15,8 +15,7 @@ from collide.base.lazy_modules import lazy_module
 from collide.base.threads import check_threads
 from collide.certificates.make_certificate import certify
 from collide.contact.contact_rows import CONTACT_DTYPE, WorldContacts, no_rows
-from collide.narrowphase.known_depth import Depth
-from collide.pairs.least_depths import checked_depth, shorten_depths
+from collide.pairs.least_depths import DepthSearch, checked_depth, shorten_depths
 from collide.pairs.security_margin import checked_margin, within
 from collide.results import PAIR_DTYPE, WorldResult
 from collide.worlds.minimum import nearest_pair
@@ -73,7 +72,7 @@ class WorldPairs(WorldScene):
         with self._pack() as packed:
             return bool(np.count_nonzero(self._answer(packed, started, margin, threads, boolean=True)))
 
-    def collisions(self, *, threads: int = 1, depth: Depth = "quick") -> WorldResult:
+    def collisions(self, *, threads: int = 1, depth: DepthSearch = "quick") -> WorldResult:
         """Every hitting pair with its depth.
 
         Parameters
@@ -96,7 +95,7 @@ class WorldPairs(WorldScene):
             return _result(packed, self._answer(packed, started, 0.0, threads), least)
 
     def distances(
-        self, max_distance: float = math.inf, *, threads: int = 1, depth: Depth = "quick"
+        self, max_distance: float = math.inf, *, threads: int = 1, depth: DepthSearch = "quick"
     ) -> WorldResult:
         """Every tested pair at most ``max_distance`` apart, hits included.
 

@@ -83,9 +83,9 @@ def test_batches_have_the_bytes_of_the_long_way_and_of_single_calls(name, shared
     assert min(seen[True], seen[False]) >= 4, seen
 
 
-def test_touching_radii_left_open_are_completed():
-    """A ball whose radius is its distance from a facet, to rounding: the kernel leaves the sign open."""
-    rng, n_open = rng_of("open in batches"), 0
+def test_touching_radii_are_decided():
+    """A ball whose radius is its distance from a facet, to rounding: the kernel leaves the sign to facets."""
+    rng, n_hits = rng_of("open in batches"), 0
     surface = collide.Mesh([(-2, -2, 0), (2, -2, 0), (0, 3, 0)], [[0, 1, 2]], solid=False)
     for _ in range(6):
         X = random_pose(rng, 1.0)
@@ -98,8 +98,9 @@ def test_touching_radii_left_open_are_completed():
         for signed in (True, False):
             r = collide.distance(surface, ball, X, at, signed=signed)
             assert r.rows.tobytes() == long_way(surface, ball, X, at, Question(False, math.inf, signed, True)).tobytes()
-            n_open += int((r.how == collide.How.UNDECIDED).sum())
-    assert n_open >= 8, n_open
+            assert not (r.how == collide.How.UNDECIDED).any()
+            n_hits += int(r.hit.sum())
+    assert 8 <= n_hits <= 88, n_hits
 
 
 @pytest.mark.parametrize("ask", [collide.collide, collide.distance])
