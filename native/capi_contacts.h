@@ -44,8 +44,14 @@ int is_farther_apart(collide_workspace *space, const double *X_WA, const double 
 double gap_along(const int64_t *ints_a, const double *numbers_a, const double *X_WA, const int64_t *ints_b,
                  const double *numbers_b, const double *X_WB, const double direction[3]);
 
+/* capi_pairs.c: the boolean of the pair taken, into the workspace's first row. */
+collide_status meet_of_pair(collide_workspace *space, const double *X_WA, const double *X_WB, unsigned flags);
+
 /* capi_pairs.c: the row of `collide_distance` of the pair taken, with a proven bound where it is beyond the limit. */
 collide_status row_of_pair(collide_workspace *space, const double *X_WA, const double *X_WB, double limit, unsigned flags,
                            collide_pair *row);
+/* The same before depths that nobody asked for are taken out, with a point of each body. */
+collide_status unfinished_row_of_pair(collide_workspace *space, const double *X_WA, const double *X_WB, double limit, unsigned flags,
+                                      collide_pair *row);
 
 #endif

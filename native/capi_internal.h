@@ -73,6 +73,8 @@ struct mesh_workspace;
 struct field_workspace;
 struct hull_faces;
 struct manifold_space;
+struct cast_space;
+struct impact_space;
 
 struct collide_shape {
     int64_t ints[INTS];
@@ -120,7 +122,9 @@ struct collide_workspace {
     struct mesh_workspace *mesh;
     struct field_workspace *field;
     struct manifold_space *manifold; /* of contacts; NULL until some are asked for */
-    void *held[2];
+    struct cast_space *cast; /* of casts and rays; NULL until some are asked for */
+    struct impact_space *impact; /* of motions; NULL until some are asked for */
+    void *held[3];
 };
 
 /* capi_mesh_pairs.c: bytes of a workspace that questions about meshes take, 0 where the library's parts do not fit; and what
@@ -137,6 +141,8 @@ void take_pair(collide_workspace *space, const collide_shape *A, const collide_s
 
 /* Poses of one body in a question of n pairs: whether they fit. */
 int take_poses(collide_poses poses, size_t n, const double **matrices, int64_t *step);
+/* The same of vectors. */
+int take_vectors(collide_vectors vectors, size_t n, const double **xyz, int64_t *step);
 /* How many pairs two batches of poses make; 0 where one is empty. */
 size_t longer(collide_poses A, collide_poses B);
 

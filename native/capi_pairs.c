@@ -100,8 +100,10 @@ void collide_workspace_free(collide_workspace *workspace)
     if (workspace == NULL) return;
     if (workspace->manifold != NULL) free_manifolds(workspace->manifold);
     free(workspace->manifold);
+    free(workspace->impact);
     free(workspace->held[0]);
     free(workspace->held[1]);
+    free(workspace->held[2]);
     free(workspace);
 }
 
@@ -265,15 +267,30 @@ collide_status collide_distance(collide_workspace *workspace, const collide_shap
     return status;
 }
 
+collide_status meet_of_pair(collide_workspace *space, const double *X_WA, const double *X_WB, unsigned flags)
+{
+    struct question asked = single(X_WA, X_WB, flags, 1);
+    uint8_t hit;
+    size_t failed;
+    return answer(space, &asked, &hit, NULL, &failed);
+}
+
+collide_status unfinished_row_of_pair(collide_workspace *space, const double *X_WA, const double *X_WB, double limit, unsigned flags,
+                                      collide_pair *row)
+{
+    struct question asked = single(X_WA, X_WB, flags, 0);
+    size_t failed;
+    asked.limit = limit;
+    memset(row, 0, sizeof *row);
+    return answer(space, &asked, NULL, row, &failed);
+}
+
 collide_status row_of_pair(collide_workspace *space, const double *X_WA, const double *X_WB, double limit, unsigned flags,
                            collide_pair *row)
 {
     struct question asked = single(X_WA, X_WB, flags, 0);
-    collide_status status;
+    collide_status status = unfinished_row_of_pair(space, X_WA, X_WB, limit, flags, row);
     size_t failed;
-    asked.limit = limit;
-    memset(row, 0, sizeof *row);
-    status = answer(space, &asked, NULL, row, &failed);
     return status == COLLIDE_OK ? close_pairs(space, &asked, row, &failed) : status;
 }
 
@@ -284,6 +301,13 @@ int take_poses(collide_poses poses, size_t n, const double **matrices, int64_t *
     *matrices = poses.matrices;
     *step = poses.count == 1 ? 0 : 16;
     return poses.count == n || poses.count == 1 ? poses.matrices != NULL || n == 0 : 0;
+}
+
+int take_vectors(collide_vectors vectors, size_t n, const double **xyz, int64_t *step)
+{
+    *xyz = vectors.xyz;
+    *step = vectors.count == 1 ? 0 : 3;
+    return vectors.count == n || vectors.count == 1 ? vectors.xyz != NULL || n == 0 : 0;
 }
 
 static int are_axes(const double *axes, size_t n)

@@ -13,8 +13,9 @@
 
    Memory. Shapes, sets of shapes, meshes, fields and workspaces are made by functions of this header and freed by the caller with
    collide_..._free, which take NULL. Numbers handed in are copied. Queries allocate nothing, but for contacts: the first ones of a
-   hull work out its faces, which are kept with it, and the first ones of a workspace what manifolds are made in; and but for
-   fields, where a walk leaves a pair open: then a list of the items nearby.
+   hull work out its faces, which are kept with it, and the first ones of a workspace what manifolds are made in; but for the
+   first casts and motions of a workspace, which make its room for them; and but for fields, where a walk leaves a pair open: then a
+   list of the items nearby.
 
    Threads. A shape, a set, a mesh or a field never changes: any number of threads may use one at once. A workspace is for one
    thread at a time: give each thread its own. Nothing else is shared. The answers do not depend on the caller's rounding mode, nor
@@ -246,6 +247,88 @@ COLLIDE_API collide_status collide_contacts_each(collide_workspace *workspace, c
                                                  const int64_t *which, size_t n, collide_poses X_WA, collide_poses X_WB,
                                                  double margin, size_t max_contacts, unsigned flags, collide_contact *contacts,
                                                  size_t capacity, size_t *starts, size_t *failed);
+
+/* --- casts ---------------------------------------------------------------------------------------------------------
+
+   How far a convex shape can be moved along a direction, without turning, until it touches another one. */
+
+/* Vectors of a batch, x y z of each, one behind another. A count of 1 stands for one that goes with all. */
+typedef struct collide_vectors {
+    const double *xyz; /* 3 * count doubles */
+    size_t count;
+} collide_vectors;
+
+/* Where a moved shape first touches one that stands: what Python's `shape_cast` says. */
+typedef struct collide_first_contact {
+    double distance;     /* t: A moved by t * direction touches B; lengths of the direction, metres of a unit vector. Infinite where
+                            nothing is met, 0 where they touch at the start */
+    double lower, upper; /* lower <= truth <= upper, proven where certified [lengths of the direction] */
+    double normal[3];    /* unit normal from A to B in W; zeros where nothing is met, and of shapes in contact at the start */
+    double point[3];     /* of B in W [m], where A touches it; a common point of shapes in contact at the start */
+    int32_t part_a, part_b; /* 0 and 0 of convex shapes; -1 where nothing is met */
+    uint8_t hit;         /* 1 where they touch on the way; also where rounding of curved shapes leaves that open */
+    uint8_t certified;   /* 1 where hit or miss is proven, and the bracket of a hit as narrow as is promised */
+    uint8_t at_start;    /* 1 where they touch before A moves */
+    uint8_t reserved[5];
+} collide_first_contact;
+
+/* A flag of casts: normals and points of shapes in contact at the start are those of `collide_distance`. */
+enum { COLLIDE_START_NORMALS = 4 };
+
+/* The first contact of A, moved along a direction in W of any length > 0, and B, which stands. max_distance : how far A moves at most
+   [lengths of the direction], >= 0, or infinite. flags : COLLIDE_TRUST_POSES, COLLIDE_START_NORMALS, or
+   both. COLLIDE_UNSUPPORTED where Python decides in integers (polytopes that graze each other on the way within rounding, motions
+   that approach a half-space by no more than rounding), and where A is a half-space, which Python refuses as well. */
+COLLIDE_API collide_status collide_cast(collide_workspace *workspace, const collide_shape *A, const collide_shape *B,
+                                        const double X_WA[16], const double X_WB[16], const double direction[3],
+                                        double max_distance, unsigned flags, collide_first_contact *first);
+
+/* The same of n casts; poses and directions go together as those of batches do. statuses : NULL, or room for n: what the single call
+   returns of each cast. All are answered that can be; the first of the others is *failed, and its status is returned. */
+COLLIDE_API collide_status collide_cast_batch(collide_workspace *workspace, const collide_shape *A, const collide_shape *B,
+                                              collide_poses X_WA, collide_poses X_WB, collide_vectors directions,
+                                              double max_distance, unsigned flags, collide_first_contact *contacts,
+                                              collide_status *statuses, size_t *failed);
+
+/* --- times of impact -----------------------------------------------------------------------------------------------
+
+   When two convex shapes in motion first touch. In unit time the origin of each moves on a line from its first pose to its second, and
+   the body turns about it with constant angular velocity: the shortest way, or as told. */
+
+/* When they first touch: what Python's `time_of_impact` says. */
+typedef struct collide_time_of_impact {
+    double time;         /* `lower` where they touch or that is open: until then they are proven apart; 1 of motions free of contact */
+    double lower, upper; /* lower <= first contact <= upper, proven; 0 and 0 of shapes in contact at the start, 1 and 1 of free motions;
+                            upper is infinite where they come within rounding of each other at `lower`, and the rest is open */
+    double normal[3];    /* unit vector from A to B in W at `time`; zeros of free motions */
+    double point_a[3];   /* nearest points of A and B in W at `time` [m]; zeros of free motions */
+    double point_b[3];
+    int32_t part_a, part_b; /* 0 and 0 of convex shapes */
+    int32_t queries;     /* questions to GJK, for diagnosis */
+    uint8_t hit;         /* 0: proven free of contact from 0 to 1 */
+    uint8_t certified;   /* 1 where the answer is proven, and upper - lower is within the tolerance */
+    uint8_t reserved[2];
+} collide_time_of_impact;
+
+/* The first contact of A and B on their ways from X_WA0 to X_WA1 and from X_WB0 to X_WB1. omega_WA, omega_WB : NULL for the shortest way;
+   or angular velocities in W [rad in unit time], three doubles, up to 1e6 long, that lead from the first orientation to the second (else
+   COLLIDE_INVALID_ARGUMENT). tolerance : width of the bracket that is to be reached, 1e-14 to 1. flags : COLLIDE_TRUST_POSES or 0.
+   COLLIDE_UNSUPPORTED: two half-spaces that start apart, which Python refuses as well. */
+COLLIDE_API collide_status collide_impact(collide_workspace *workspace, const collide_shape *A, const collide_shape *B,
+                                          const double X_WA0[16], const double X_WA1[16], const double X_WB0[16],
+                                          const double X_WB1[16], const double *omega_WA, const double *omega_WB,
+                                          double tolerance, unsigned flags, collide_time_of_impact *impact);
+
+/* Motions of a batch: n of each, or 1 that goes with all; xyz of an angular velocity is NULL for the shortest way. */
+typedef struct collide_motions {
+    collide_poses X_WA0, X_WA1, X_WB0, X_WB1;
+    collide_vectors omega_WA, omega_WB;
+} collide_motions;
+
+/* The same of n motions. statuses, failed : as of `collide_cast_batch`. */
+COLLIDE_API collide_status collide_impact_batch(collide_workspace *workspace, const collide_shape *A, const collide_shape *B,
+                                                const collide_motions *motions, double tolerance, unsigned flags,
+                                                collide_time_of_impact *impacts, collide_status *statuses, size_t *failed);
 
 /* --- meshes --------------------------------------------------------------------------------------------------------
 

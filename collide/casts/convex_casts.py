@@ -8,20 +8,26 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.casts.cast_pairs import CAST_ROW, LOWER, NORMAL, QUESTION, SIZE, STATUS, TOUCHING, UPPER, VALUE, cast_pairs
+from collide.casts.cast_pairs import CAST_ROW, LOWER, NORMAL, QUESTION, STATUS, TOUCHING, UPPER, VALUE, cast_pairs
+from collide.casts.close_casts import (
+    MARKS,
+    PACE_TERMS,
+    close_casts,
+    list_starts,
+    meet_at_start,
+    part_starts,
+    settle_levels,
+)
 from collide.casts.exact_cast import cast_exactly, corners_of
 from collide.casts.portal import BEHIND, HIT, LEVEL, MISS, OPEN
 from collide.casts.posed_parts import PartPairs, PosedParts
 from collide.casts.silhouette import CAST_DOUBLES, CAST_INTEGERS
 from collide.certificates.exact_parts import common_vertices
 from collide.kernels import address_of
-from collide.lowering.packed_convex import HALFSPACE, POINTS
-from collide.lowering.shape_table import KIND
-from collide.narrowphase.bounds import PROMISE_CURVED, PROMISE_STORED
+from collide.lowering.packed_convex import HALFSPACE
 from collide.narrowphase.convex_kernel_calls import run_pairs
 from collide.numerics.exact_points import in_integers, integers, rounded
 from collide.numerics.exact_vectors import inner
-from collide.results import UNDECIDED
 
 
 class CastRows(NamedTuple):
@@ -91,25 +97,18 @@ def answer_questions(pairs: PartPairs, directions: np.ndarray, limits: np.ndarra
 def answer_part_pairs(parts: PosedParts, pairs: np.ndarray, questions: np.ndarray) -> tuple[np.ndarray, Marks]:
     """(rows (k, CAST_ROW) whose status is HIT or MISS, what is known of them) of k pairs of parts."""
     k = len(pairs)
-    rows = _kernel_rows(parts, pairs, questions)
-    marks = Marks(np.ones(k, dtype=bool), np.ones(k, dtype=bool), np.zeros(k, dtype=bool))
+    rows, columns = _kernel_rows(parts, pairs, questions), np.empty((MARKS, k), dtype=np.uint8)
+    marks = Marks(*columns.view(bool))
     if not k:
         return rows, marks
-    _settle_starts(parts, pairs, rows, marks)
-    for i in np.flatnonzero(rows[:, STATUS] == LEVEL).tolist():
+    listed, terms = np.empty(k, dtype=np.int64), np.empty(PACE_TERMS)
+    asked = *map(address_of, (parts.shape_of, pairs, questions)), k, address_of(rows)
+    numbers_at, poses_at = parts.table.addresses[1], address_of(parts.poses.rows)
+    _settle_starts(parts, pairs, rows, columns, listed)
+    for i in listed[: settle_levels(numbers_at, poses_at, *asked, address_of(terms), address_of(listed))].tolist():
         _settle_level(parts, pairs[i], questions[i], rows[i])
-    kinds = parts.table.ints[:, KIND]
-    is_curved = ((kinds != POINTS) & (kinds != HALFSPACE))[parts.shape_of[pairs]].any(axis=1)
-    width = np.where(is_curved, PROMISE_CURVED, PROMISE_STORED) * rows[:, SIZE]
-    hits = (rows[:, STATUS] == HIT) & ~marks.at_start
-    wide = hits & (rows[:, UPPER] - rows[:, LOWER] > width)
-    for i in np.flatnonzero((rows[:, STATUS] == OPEN) | wide).tolist():
-        if _has_exact_numbers(parts, pairs[i]):
-            settle_exactly(parts, pairs[i], questions[i], rows[i])
-        elif rows[i, STATUS] == OPEN:
-            rows[i, STATUS], marks.proven[i] = HIT, False
-            rows[i, [LOWER, VALUE]] = np.minimum(rows[i, [LOWER, VALUE]], questions[i, 3])
-    marks.certified[:] = marks.proven & ~(hits & (rows[:, UPPER] - rows[:, LOWER] > width))
+    for i in listed[: close_casts(*parts.table.addresses, *asked, address_of(columns), address_of(listed))].tolist():
+        settle_exactly(parts, pairs[i], questions[i], rows[i])
     return rows, marks
 
 
@@ -148,38 +147,17 @@ def _kernel_rows(parts: PosedParts, pairs: np.ndarray, questions: np.ndarray) ->
     return rows
 
 
-def _settle_starts(parts: PosedParts, pairs, rows, marks: Marks) -> None:
-    """Decide by pair queries whether rows that are BEHIND, or OPEN down to t ≤ 0, touch at the start: rows apart become
-    MISS where proven behind, else OPEN; touching rows get a common point and no normal.
-    """
-    behind = np.flatnonzero((rows[:, STATUS] == BEHIND) | ((rows[:, STATUS] == OPEN) & (rows[:, LOWER] <= 0.0)))
-    if not len(behind):
-        return
-    start = run_pairs(parts.table, parts.poses, parts.shape_of, pairs[behind], boolean=True, limit=0.0)
-    apart = behind[~start["hit"]]
-    is_behind = (rows[apart, STATUS] == BEHIND) & (rows[apart, UPPER] <= 0.0)
-    rows[apart, STATUS] = np.where(is_behind, MISS, OPEN)
-    rows[apart, LOWER] = np.maximum(rows[apart, LOWER], 0.0)
-    touching = behind[start["hit"]]
-    if not len(touching):
-        return
-    shared = run_pairs(
-        parts.table, parts.poses, parts.shape_of, pairs[touching], boolean=False, limit=0.0, depths=False
-    )
-    rows[touching, STATUS] = HIT
-    rows[touching[:, None], [LOWER, VALUE, UPPER]] = 0.0
-    rows[touching, NORMAL : NORMAL + 3] = 0.0
-    rows[touching, TOUCHING : TOUCHING + 3] = shared["point_b"]
-    marks.at_start[touching] = True
-    marks.proven[touching] = start["how"][start["hit"]] != UNDECIDED
-
-
-def _has_exact_numbers(parts: PosedParts, pair: np.ndarray) -> bool:
-    """Whether a pair consists of polytopes as stored, or of one and a half-space."""
-    packed_a, packed_b = parts.packed(pair[0]), parts.packed(pair[1])
-    if packed_a.kind != POINTS or packed_b.kind not in (POINTS, HALFSPACE):
-        return False
-    return not (packed_a.radius or packed_a.slop or packed_b.radius or packed_b.slop)
+def _settle_starts(parts: PosedParts, pairs, rows: np.ndarray, marks: np.ndarray, listed: np.ndarray) -> None:
+    """Begin the marks, and decide by pair queries which rows touch at the start.   listed : (k,) int64 to work in."""
+    of_rows = address_of(rows), address_of(marks), len(rows), address_of(listed)
+    count = list_starts(*of_rows)
+    for settle in (part_starts, meet_at_start):
+        if count:
+            answers = run_pairs(
+                parts.table, parts.poses, parts.shape_of, pairs[listed[:count]], boolean=settle is part_starts,
+                limit=0.0, depths=False,
+            )
+            count = settle(*of_rows, count, address_of(answers))
 
 
 def settle_exactly(parts: PosedParts, pair: np.ndarray, question: np.ndarray, row: np.ndarray) -> None:

@@ -22,12 +22,39 @@ OK, NO_MEMORY, INVALID_ARGUMENT, INVALID_SHAPE, INVALID_POSE, OUT_OF_RANGE, ENDL
     range(9)
 )
 TOO_MANY = 9
-TRUST_POSES, UNSIGNED = 1, 2
+TRUST_POSES, UNSIGNED, START_NORMALS = 1, 2, 4
 
 
 class Poses(ctypes.Structure):
     _fields_ = [("matrices", c_void_p), ("count", c_size_t)]
 
+
+class Vectors(ctypes.Structure):
+    _fields_ = [("xyz", c_void_p), ("count", c_size_t)]
+
+
+class Motions(ctypes.Structure):
+    _fields_ = [
+        ("X_WA0", Poses), ("X_WA1", Poses), ("X_WB0", Poses), ("X_WB1", Poses), ("omega_WA", Vectors),
+        ("omega_WB", Vectors),
+    ]
+
+
+#: Rows of `collide_time_of_impact`.
+TIME_OF_IMPACT = np.dtype(
+    [
+        ("time", "f8"), ("lower", "f8"), ("upper", "f8"), ("normal", "f8", 3), ("point_a", "f8", 3),
+        ("point_b", "f8", 3), ("part_a", "i4"), ("part_b", "i4"), ("queries", "i4"), ("hit", "?"), ("certified", "?"),
+        ("reserved", "u1", 2),
+    ]
+)
+#: Rows of `collide_first_contact`.
+FIRST_CONTACT = np.dtype(
+    [
+        ("distance", "f8"), ("lower", "f8"), ("upper", "f8"), ("normal", "f8", 3), ("point", "f8", 3),
+        ("item_a", "i4"), ("item_b", "i4"), ("hit", "?"), ("certified", "?"), ("at_start", "?"), ("reserved", "u1", 5),
+    ]
+)
 
 _TYPES = {
     "collide_status_text": [c_int],
@@ -71,6 +98,16 @@ _TYPES = {
     "collide_contacts_each": [
         c_void_p, c_void_p, c_void_p, c_size_t, Poses, Poses, c_double, c_size_t, c_uint, c_void_p, c_size_t, c_void_p,
         POINTER(c_size_t),
+    ],
+    "collide_cast": [
+        c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_uint, c_void_p,
+    ],
+    "collide_cast_batch": [
+        c_void_p, c_void_p, c_void_p, Poses, Poses, Vectors, c_double, c_uint, c_void_p, c_void_p, POINTER(c_size_t),
+    ],
+    "collide_impact": [c_void_p] * 9 + [c_double, c_uint, c_void_p],
+    "collide_impact_batch": [
+        c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_uint, c_void_p, c_void_p, POINTER(c_size_t),
     ],
     "collide_mesh_create": [c_void_p, c_size_t, c_void_p, c_size_t, c_int, c_void_p],
     "collide_mesh_of_shape": [c_void_p, c_void_p],
@@ -285,6 +322,52 @@ class Asker:
             max_contacts, flags, rows.ctypes.data, capacity, starts.ctypes.data, failed,
         )
         return status, rows, starts.astype(np.int64), failed.value
+
+    def cast(self, A: CShape, B: CShape, X_WA, X_WB, direction, limit: float = math.inf, flags: int = 0):
+        """(status, row)."""
+        rows, X_WA, X_WB, direction = np.full(1, 7, dtype=FIRST_CONTACT), *map(_doubles, (X_WA, X_WB, direction))
+        status = library().collide_cast(
+            self.handle, A.handle, B.handle, X_WA.ctypes.data, X_WB.ctypes.data, direction.ctypes.data, limit, flags,
+            rows.ctypes.data,
+        )
+        return status, rows[0]
+
+    def cast_batch(self, A: CShape, B: CShape, X_WA, X_WB, directions, limit: float = math.inf, flags: int = 0):
+        """(status, rows, their statuses, number of the cast to blame)."""
+        X_WA, X_WB = (_doubles(X).reshape(-1, 4, 4) for X in (X_WA, X_WB))
+        directions, failed = _doubles(directions).reshape(-1, 3), c_size_t(0)
+        n = max(len(X_WA), len(X_WB), len(directions))
+        rows, statuses = np.full(n, 7, dtype=FIRST_CONTACT), np.full(n, -1, dtype=np.int32)
+        status = library().collide_cast_batch(
+            self.handle, A.handle, B.handle, Poses(X_WA.ctypes.data, len(X_WA)), Poses(X_WB.ctypes.data, len(X_WB)),
+            Vectors(directions.ctypes.data, len(directions)), limit, flags, rows.ctypes.data, statuses.ctypes.data,
+            failed,
+        )
+        return status, rows, statuses, failed.value
+
+    def impact(self, A: CShape, B: CShape, ends, omegas=(None, None), tolerance: float = 1e-9, flags: int = 0):
+        """(status, row).   ends : poses of A at times 0 and 1, then of B.   omegas : of A and of B."""
+        rows, ends = np.full(1, 7, dtype=TIME_OF_IMPACT), [_doubles(X) for X in ends]
+        omegas = [None if omega is None else _doubles(omega) for omega in omegas]
+        at = [None if values is None else values.ctypes.data for values in (*ends, *omegas)]
+        status = library().collide_impact(self.handle, A.handle, B.handle, *at, tolerance, flags, rows.ctypes.data)
+        return status, rows[0]
+
+    def impact_batch(self, A: CShape, B: CShape, ends, omegas=(None, None), tolerance: float = 1e-9, flags: int = 0):
+        """(status, rows, their statuses, number of the motion to blame)."""
+        ends, failed = [_doubles(X).reshape(-1, 4, 4) for X in ends], c_size_t(0)
+        omegas = [np.zeros((0, 3)) if omega is None else _doubles(omega).reshape(-1, 3) for omega in omegas]
+        n = max(map(len, (*ends, *omegas)))
+        rows, statuses = np.full(n, 7, dtype=TIME_OF_IMPACT), np.full(n, -1, dtype=np.int32)
+        motions = Motions(
+            *(Poses(X.ctypes.data, len(X)) for X in ends),
+            *(Vectors(omega.ctypes.data if len(omega) else None, len(omega)) for omega in omegas),
+        )
+        status = library().collide_impact_batch(
+            self.handle, A.handle, B.handle, ctypes.byref(motions), tolerance, flags, rows.ctypes.data,
+            statuses.ctypes.data, failed,
+        )
+        return status, rows, statuses, failed.value
 
     def meshes_meet(self, A: CMesh, B: CMesh, X_WA, X_WB, flags: int = 0) -> tuple[int, bool]:
         hit, X_WA, X_WB = c_int(), _doubles(X_WA), _doubles(X_WB)

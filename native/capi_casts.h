@@ -1,0 +1,42 @@
+/* Rows of casts and rays, and the room of a workspace for them. */
+#ifndef COLLIDE_CAPI_CASTS_H
+#define COLLIDE_CAPI_CASTS_H
+
+#include "capi_internal.h"
+
+/* A question and a row (collide/casts/cast_pairs.py), and how rows end (collide/casts/portal.py). */
+enum { CAST_LIMIT = 3, CAST_QUESTION };
+enum {
+    CAST_STATUS, CAST_LOWER, CAST_VALUE, CAST_UPPER, CAST_NORMAL, CAST_TOUCHING = CAST_NORMAL + 3, CAST_SIZE = CAST_TOUCHING + 3, CAST_ROW
+};
+enum { CAST_MISS, CAST_HIT };
+/* Marks of a row, and doubles that a pace is the sum of (collide/casts/close_casts.py). */
+enum { IS_PROVEN, IS_CERTIFIED, IS_AT_START, CAST_MARKS, PACE_TERMS = 144 };
+/* A ray and the row of a chord (collide/casts/cut_parts.py). */
+enum { RAY_ORIGIN, RAY_VECTOR = 3, CHORD_RAY = 6 };
+enum {
+    CHORD_STATE, FIRST_LOWER, FIRST_VALUE, FIRST_UPPER, LAST_LOWER, LAST_VALUE, LAST_UPPER, FIRST_SIDE, LAST_SIDE, FIRST_NORMAL,
+    LAST_NORMAL = FIRST_NORMAL + 3, CHORD_ROW = LAST_NORMAL + 3
+};
+/* What `write_cast_constants` writes (collide/casts/cast_constants.py). */
+enum { K_QUESTION, K_CAST_ROW, K_MARKS, K_PACE_TERMS, K_RAY, K_CHORD_ROW, K_DOUBLES, K_INTEGERS, CAST_MEASURES };
+
+struct cast_space {
+    double question[CAST_QUESTION], row[CAST_ROW], terms[PACE_TERMS];
+    double ray[CHORD_RAY], chord[CHORD_ROW];
+    int64_t exponent, listed, ray_and_part[2];
+    uint8_t marks[CAST_MARKS];
+    double *doubles;
+    int64_t *integers;
+};
+
+/* The workspace's room for casts, made at the first of them; NULL where there is no memory, or the library's parts do not fit. */
+struct cast_space *cast_space_of(collide_workspace *space);
+
+/* A direction scaled by a power of two, into `vector` and the room's `exponent`; 0 where it is none. */
+int take_direction(collide_workspace *space, const double direction[3], double vector[3]);
+
+/* Whether a matrix is a pose, which then stands in row `row` of the workspace's poses. */
+int put_pose(collide_workspace *space, const double *X, unsigned flags, int row);
+
+#endif
