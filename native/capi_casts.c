@@ -15,7 +15,7 @@ struct cast_space *cast_space_of(collide_workspace *space)
     if (space->cast != NULL) return space->cast;
     if (space->kernels->write_cast_constants(address_of(m), CAST_MEASURES) != CAST_MEASURES || m[K_QUESTION] != CAST_QUESTION ||
         m[K_CAST_ROW] != CAST_ROW || m[K_MARKS] != CAST_MARKS || m[K_PACE_TERMS] != PACE_TERMS || m[K_RAY] != CHORD_RAY ||
-        m[K_CHORD_ROW] != CHORD_ROW)
+        m[K_CHORD_ROW] != CHORD_ROW || m[K_FACET_RAY] != FACET_RAY || m[K_FACET_HIT] != FACET_HIT)
         return NULL;
     made = cache_lines(sizeof *made + 8 * (size_t)(m[K_DOUBLES] + m[K_INTEGERS]), &held);
     if (made == NULL) return NULL;

@@ -19,7 +19,10 @@ enum {
     LAST_NORMAL = FIRST_NORMAL + 3, CHORD_ROW = LAST_NORMAL + 3
 };
 /* What `write_cast_constants` writes (collide/casts/cast_constants.py). */
-enum { K_QUESTION, K_CAST_ROW, K_MARKS, K_PACE_TERMS, K_RAY, K_CHORD_ROW, K_DOUBLES, K_INTEGERS, CAST_MEASURES };
+enum { K_QUESTION, K_CAST_ROW, K_MARKS, K_PACE_TERMS, K_RAY, K_CHORD_ROW, K_DOUBLES, K_INTEGERS, K_FACET_RAY, K_FACET_HIT, CAST_MEASURES };
+/* A ray to facets, and a hit (collide/narrowphase/facets/ray_surface.py). */
+enum { FACET_RAY = 8 };
+enum { HIT_RAY, HIT_FACET, HIT_LOWER, HIT_VALUE, HIT_UPPER, HIT_OPEN, HIT_PLACE, FACET_HIT };
 
 struct cast_space {
     double question[CAST_QUESTION], row[CAST_ROW], terms[PACE_TERMS];

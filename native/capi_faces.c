@@ -3,13 +3,6 @@
 
 #include <stdlib.h>
 
-#if defined(_MSC_VER)
-#include <intrin.h>
-#define PUT_IF_NULL(place, made) (_InterlockedCompareExchangePointer((void *volatile *)(place), (made), NULL) == NULL)
-#else
-#define PUT_IF_NULL(place, made) __sync_bool_compare_and_swap((place), NULL, (made))
-#endif
-
 /* What `make_faces` of collide/lowering/hull_polygons.py says in the header of its memory. */
 enum { OF_FACES, OF_CORNERS, OF_IDS, OF_KEPT, OF_LARGEST };
 

@@ -67,6 +67,14 @@ static inline int64_t code_at(const void *function)
     return code;
 }
 
+/* What threads make at once is made by the first of them. */
+#if defined(_MSC_VER)
+#include <intrin.h>
+#define PUT_IF_NULL(place, made) (_InterlockedCompareExchangePointer((void *volatile *)(place), (made), NULL) == NULL)
+#else
+#define PUT_IF_NULL(place, made) __sync_bool_compare_and_swap((place), NULL, (made))
+#endif
+
 /* --- shapes -------------------------------------------------------------------------------------------------------- */
 
 struct mesh_workspace;
@@ -75,6 +83,7 @@ struct hull_faces;
 struct manifold_space;
 struct cast_space;
 struct impact_space;
+struct compound_space;
 
 struct collide_shape {
     int64_t ints[INTS];
@@ -84,6 +93,7 @@ struct collide_shape {
     void *block;        /* holds coordinates and coarse points */
     void *tree;         /* NULL where there is none */
     struct hull_faces *volatile faces; /* NULL until contacts are asked for (capi_faces.h) */
+    struct collide_mesh *volatile surface; /* NULL until rays are asked for (capi_mesh.c) */
 };
 
 struct collide_shape_set {
@@ -124,6 +134,7 @@ struct collide_workspace {
     struct manifold_space *manifold; /* of contacts; NULL until some are asked for */
     struct cast_space *cast; /* of casts and rays; NULL until some are asked for */
     struct impact_space *impact; /* of motions; NULL until some are asked for */
+    struct compound_space *compound; /* of unions; NULL until some are asked about */
     void *held[3];
 };
 

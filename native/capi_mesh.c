@@ -107,6 +107,7 @@ static collide_status build_mesh(const struct collide_kernels *kernels, const do
     if (!arena.failed) {
         measure(kernels, mesh, m, &made, n_facets);
         digest(kernels, mesh, &made, n_facets);
+        mesh->reach = kernels->reach_of_facets(address_of(made.triangles), n_facets, address_of(mesh->numbers + CENTRE));
         keep(kernels, &arena, m, mesh, &made, n_facets);
     }
     arena_end(&arena);
@@ -276,4 +277,18 @@ collide_status collide_mesh_of_shape(const collide_shape *shape, collide_mesh **
     if (status == COLLIDE_OK) *mesh = made;
     else collide_mesh_free(made);
     return status;
+}
+
+collide_status surface_of(const collide_shape *shape, const collide_mesh **mesh)
+{
+    collide_shape *kept = (collide_shape *)shape; /* what is made is no part of what the shape is */
+    collide_mesh *made = NULL;
+    collide_status status;
+    *mesh = NULL;
+    if (kept->surface == NULL) {
+        if ((status = collide_mesh_of_shape(shape, &made)) != COLLIDE_OK) return status;
+        if (!PUT_IF_NULL(&kept->surface, made)) collide_mesh_free(made); /* another thread was sooner */
+    }
+    *mesh = kept->surface;
+    return COLLIDE_OK;
 }

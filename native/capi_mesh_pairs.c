@@ -130,3 +130,15 @@ collide_status collide_mesh_distance(collide_workspace *workspace, const collide
     round_as_before(given);
     return status;
 }
+
+int64_t facets_on_ray(collide_workspace *space, const collide_mesh *mesh, const double *X, const double *ray, double *hits,
+                      int64_t capacity, int64_t *count)
+{
+    const int64_t *h = space->mesh->header;
+    int64_t counters[3] = {0, 0, 0}, progress[2] = {0, 0};
+    int64_t status = space->kernels->cast_rays(
+        address_of(mesh->tree), address_of(X), 0, address_of(ray), 1, 1, address_of(hits), capacity, address_of(counters),
+        address_of(progress), h[STACK_AT], STACK_OF_MESHES, h[MESH_DOUBLES_AT], h[MESH_INTEGERS_AT], h[EXACT_CODE]);
+    *count = progress[1];
+    return status;
+}

@@ -1,4 +1,5 @@
 /* Workspaces and queries: as `run_poses` of collide/narrowphase/convex_kernel_calls.py and `distance` of collide/pairs/query.py. */
+#include "capi_compound.h"
 #include "capi_contacts.h"
 
 #include <math.h>
@@ -101,6 +102,7 @@ void collide_workspace_free(collide_workspace *workspace)
     if (workspace->manifold != NULL) free_manifolds(workspace->manifold);
     free(workspace->manifold);
     free(workspace->impact);
+    free_compound_space(workspace->compound);
     free(workspace->held[0]);
     free(workspace->held[1]);
     free(workspace->held[2]);

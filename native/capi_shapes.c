@@ -105,6 +105,7 @@ void collide_shape_free(collide_shape *shape)
     if (shape == NULL) return;
     free(shape->tree);
     free_faces(shape->faces);
+    collide_mesh_free(shape->surface);
     free(shape->points);
     free(shape->block);
     free(shape);

@@ -11,13 +11,13 @@
    Errors. Every function that can fail returns a collide_status and, unless that is COLLIDE_OK, leaves the objects that it
    was to make NULL. Nothing prints, nothing ends the process, nothing jumps.
 
-   Memory. Shapes, sets of shapes, meshes, fields and workspaces are made by functions of this header and freed by the caller with
+   Memory. Shapes, sets of shapes, unions, meshes, fields and workspaces are made by functions of this header and freed by the caller with
    collide_..._free, which take NULL. Numbers handed in are copied. Queries allocate nothing, but for contacts: the first ones of a
    hull work out its faces, which are kept with it, and the first ones of a workspace what manifolds are made in; but for the
-   first casts and motions of a workspace, which make its room for them; and but for fields, where a walk leaves a pair open: then a
+   first casts, motions and unions of a workspace, which make its room for them, and each new pair of unions; and but for fields, where a walk leaves a pair open: then a
    list of the items nearby.
 
-   Threads. A shape, a set, a mesh or a field never changes: any number of threads may use one at once. A workspace is for one
+   Threads. A shape, a set, a union, a mesh or a field never changes: any number of threads may use one at once. A workspace is for one
    thread at a time: give each thread its own. Nothing else is shared. The answers do not depend on the caller's rounding mode, nor
    on whether it flushes small numbers to 0: both are set for the length of a call, and put back.
 
@@ -330,6 +330,29 @@ COLLIDE_API collide_status collide_impact_batch(collide_workspace *workspace, co
                                                 const collide_motions *motions, double tolerance, unsigned flags,
                                                 collide_time_of_impact *impacts, collide_status *statuses, size_t *failed);
 
+/* --- unions ----------------------------------------------------------------------------------------------------------
+
+   Bodies of several convex shapes, each at its own pose: what Python's `Compound` is, without meshes among its items. */
+typedef struct collide_compound collide_compound;
+
+/* The union of n >= 1 shapes, shape k at the pose poses + 16 * k in the frame of the union. Shapes are not copied: free the union before
+   them. A convex shape is asked about with unions as one of n = 1. O(n log n). COLLIDE_INVALID_POSE: a matrix is no pose. */
+COLLIDE_API collide_status collide_compound_create(const collide_shape *const *shapes, const double *poses, size_t n,
+                                                   collide_compound **compound);
+
+/* Frees a union; NULL is fine. A union never changes and any number of threads may use it. */
+COLLIDE_API void collide_compound_free(collide_compound *compound);
+
+/* Booleans and signed distances of A and B at n pairs of poses, as collide_collide_batch and collide_distance_batch; n may be 1.
+   part_a and part_b of a row name parts. The tables of a pair are laid out when it is asked about first, O(n log n), and kept in the
+   workspace until another pair is: ask about a pair at all its poses in turn. */
+COLLIDE_API collide_status collide_compound_collide(collide_workspace *workspace, const collide_compound *A,
+                                                    const collide_compound *B, collide_poses X_WA, collide_poses X_WB,
+                                                    unsigned flags, uint8_t *hits, size_t *failed);
+COLLIDE_API collide_status collide_compound_distance(collide_workspace *workspace, const collide_compound *A,
+                                                     const collide_compound *B, collide_poses X_WA, collide_poses X_WB,
+                                                     double max_distance, unsigned flags, collide_pair *pairs, size_t *failed);
+
 /* --- meshes --------------------------------------------------------------------------------------------------------
 
    Triangles, as a solid or as a surface, asked about with each other and with polytopes. This is less than Python answers:
@@ -365,6 +388,44 @@ COLLIDE_API collide_status collide_mesh_collide(collide_workspace *workspace, co
 COLLIDE_API collide_status collide_mesh_distance(collide_workspace *workspace, const collide_mesh *A, const collide_mesh *B,
                                                  const double X_WA[16], const double X_WB[16], unsigned flags,
                                                  collide_pair *pair);
+
+/* --- rays ------------------------------------------------------------------------------------------------------------
+
+   Where rays first meet the surface of a shape. Surfaces are closed: a ray through an edge meets the facets around it, a ray from the
+   surface meets it at 0, one from inside meets the wall on its way out. */
+
+/* Where a ray first meets a surface: what Python's `raycast` says. */
+typedef struct collide_ray_hit {
+    double distance;     /* t of the point origin + t * direction: lengths of the direction, metres of a unit vector; infinite where
+                            nothing is met */
+    double lower, upper; /* lower <= truth <= upper, proven where certified */
+    double normal[3];    /* outward unit normal of the surface in W; zeros of a facet without area, and where nothing is met */
+    double point[3];     /* in W [m]; zeros where nothing is met */
+    int32_t facet;       /* of a mesh, or of the triangles of a box or hull; of cylinders and cones 0 round about, 1 below, 2 above, of
+                            capsules 1 and 2 on the balls at their ends; else 0, or -1: nothing is met, or a hull is swept by a ball */
+    int32_t part;        /* 0; -1 where nothing is met */
+    uint8_t hit;         /* 1 where a surface is met; also where rounding of curved shapes leaves that open */
+    uint8_t certified;   /* 1 where hit or miss is proven, and the bracket is narrow */
+    uint8_t reserved[6];
+} collide_ray_hit;
+
+/* n rays at a convex shape: poses, origins and directions, n of each, or 1 that goes with all. Origins are in W [m], directions in W of any
+   length > 0. max_distance : t up to which the surface counts, >= 0, or infinite. flags : COLLIDE_TRUST_POSES or 0. statuses : NULL, or
+   room for n. All rays are answered that can be; the first of the others is *failed, and its status is returned. The first ray at a polytope
+   works out its facets, which are kept with it.
+
+   Rays through edges and corners meet several facets at once, or within rounding: the row then has a bracket that holds the first of
+   them, and names the least facet of those, where Python works out t in integers. COLLIDE_UNSUPPORTED, never a guess: rays in the plane of a
+   facet, t too near to the limit, rays that begin within rounding of a facet or of a half-space's plane, slivers of facets without a normal in
+   doubles. */
+COLLIDE_API collide_status collide_raycast(collide_workspace *workspace, const collide_shape *shape, collide_poses X_WA,
+                                           collide_vectors origins, collide_vectors directions, double max_distance, unsigned flags,
+                                           collide_ray_hit *hits, collide_status *statuses, size_t *failed);
+
+/* The same of a mesh. */
+COLLIDE_API collide_status collide_mesh_raycast(collide_workspace *workspace, const collide_mesh *mesh, collide_poses X_WA,
+                                                collide_vectors origins, collide_vectors directions, double max_distance,
+                                                unsigned flags, collide_ray_hit *hits, collide_status *statuses, size_t *failed);
 
 /* --- fields ---------------------------------------------------------------------------------------------------------
 

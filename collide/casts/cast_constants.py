@@ -9,10 +9,15 @@ from collide.casts.close_casts import MARKS, PACE_TERMS
 from collide.casts.cut_parts import RAY, RAY_DOUBLES, RAY_ROW
 from collide.casts.silhouette import CAST_DOUBLES, CAST_INTEGERS
 from collide.kernels import entry, view_i64
+from collide.narrowphase.facets import ray_surface
 
 #: In this order (`native/capi_casts.h`).
 _CONSTANTS = np.array(
-    [QUESTION, CAST_ROW, MARKS, PACE_TERMS, RAY, RAY_ROW, max(CAST_DOUBLES, RAY_DOUBLES), CAST_INTEGERS], dtype=np.int64
+    [
+        QUESTION, CAST_ROW, MARKS, PACE_TERMS, RAY, RAY_ROW, max(CAST_DOUBLES, RAY_DOUBLES), CAST_INTEGERS,
+        ray_surface.RAY, ray_surface.HIT,
+    ],
+    dtype=np.int64,
 )
 
 

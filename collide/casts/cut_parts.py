@@ -37,6 +37,8 @@ RAY = 6
 RAY_ROW = 15
 STATE, FIRST_LOWER, FIRST, FIRST_UPPER, LAST_LOWER, LAST, LAST_UPPER = range(7)
 FIRST_SIDE, LAST_SIDE, FIRST_NORMAL, LAST_NORMAL = 7, 8, 9, 12
+#: Brackets wider than this, in units of t of the far side, are not certified.
+MAX_WIDTH = 2.0**-36
 #: Doubles of workspace: of a cast, two poses, and a point at a frame's origin.
 RAY_DOUBLES = CAST_DOUBLES + 2 * POSE + 24
 

@@ -11,17 +11,14 @@ from fractions import Fraction
 import numpy as np
 
 from collide.casts.directions import Directions
+from collide.casts.ray_ends import NARROW, group_first_facets, put_rays_to_facets, scale_facet_t
 from collide.casts.ray_hits import RayEvents
+from collide.kernels import address_of
 from collide.lowering.facet_bodies import Body
 from collide.narrowphase.facets import ray_surface as layout
-from collide.narrowphase.facets.facet_geometry import FacetCorners, exact_point, facet_normals
+from collide.narrowphase.facets.facet_geometry import exact_point, facet_normals
 from collide.narrowphase.facets.facet_queries import facets_on_rays
 from collide.numerics.exact_points import enters, integers, on_one_grid, placed, rounded
-
-#: Brackets wider than this, in units of the length of the ray up to beyond the body, are worked out exactly.
-_MAX_WIDTH = 2.0**-40
-#: Limits below this, in the same units, may have lost digits: facets within them are worked out exactly.
-_MIN_LIMIT = 1e-290
 
 
 def facets_met(
@@ -33,21 +30,20 @@ def facets_met(
     """
     rays = _rays(body, X_WA, origins, directions, limit)
     hits, _ = facets_on_rays(body.tree, X_WA if len(X_WA) != 1 else X_WA[0], rays, not every)
-    met = _MetFacets(body, X_WA, rays, directions.exponents, hits, limit)
+    met = _MetFacets(body, X_WA, rays, np.ascontiguousarray(directions.exponents), hits, limit)
     met.settle(every)
     return met.events()
 
 
 def _rays(body: Body, X_WA, origins, directions: Directions, limit: float) -> np.ndarray:
     """(n, RAY) rays as kernels take them."""
-    rays = np.empty((len(origins), layout.RAY))
-    rays[:, :3], rays[:, 3:6] = origins, directions.vectors
-    # Beyond the ball around the body, wherever the ray begins.
-    centre = X_WA[:, :3, 3] + (X_WA[:, :3, :3] * body.centre).sum(axis=2)
-    stretch = np.abs(X_WA[:, :3, :3]).sum(axis=(1, 2))
-    away = np.abs(rays[:, :3] - centre).sum(axis=1) + stretch * body.reach + 1e-100
-    rays[:, 6] = np.ldexp(1.0, np.frexp(away)[1] + 2)
-    rays[:, 7] = np.maximum(directions.limits(limit) / rays[:, 6], _MIN_LIMIT)
+    rays, X_WA = np.empty((len(origins), layout.RAY)), np.ascontiguousarray(X_WA)
+    origins, vectors = np.ascontiguousarray(origins), np.ascontiguousarray(directions.vectors)
+    limits, centre, step = directions.limits(limit), np.ascontiguousarray(body.centre), 16 if len(X_WA) > 1 else 0
+    put_rays_to_facets(
+        address_of(X_WA), step, address_of(centre), body.reach, address_of(origins), address_of(vectors),
+        address_of(limits), len(rays), address_of(rays),
+    )
     return rays
 
 
@@ -57,6 +53,7 @@ def _rays(body: Body, X_WA, origins, directions: Directions, limit: float) -> np
 class _MetFacets:
     """Facets met by rays, with brackets of t, and exact t where needed.
 
+    groups : of `group_first_facets`.   corners : (m, 3, 3) of the hit facets.
     t : (m, 3) distance, lower, upper of each, in units of the direction's length.   order : of the rows, ray by ray,
     from `settle`.   keep : (m,) bool, rows that are answers.
     """
@@ -64,18 +61,19 @@ class _MetFacets:
     def __init__(self, body: Body, X_WA, rays, exponents, hits: np.ndarray, limit: float):
         self.body, self.X_WA, self.rays, self.exponents, self.limit = body, X_WA, rays, exponents, limit
         self.ray, self.facet = (hits[:, k].astype(np.int64) for k in (layout.RAY_OF, layout.FACET_OF))
-        self.narrow = (hits[:, layout.OPEN] == 0.0) & (hits[:, layout.UPPER] - hits[:, layout.LOWER] <= _MAX_WIDTH)
-        self.narrow &= (hits[:, layout.UPPER] <= rays[self.ray, 7]) & (rays[self.ray, 7] > _MIN_LIMIT)
-        unit = rays[self.ray, 6:7]
-        self.t = np.ldexp(hits[:, [layout.VALUE, layout.LOWER, layout.UPPER]] * unit, -exponents[self.ray, None])
+        marks, self.t = np.empty(len(hits), dtype=np.uint8), np.empty((len(hits), 3))
+        groups, at = np.empty((len(hits), 5), dtype=np.int64), (address_of(hits), len(hits), address_of(rays))
+        self.groups = groups[: group_first_facets(*at, address_of(marks), address_of(groups))]
+        self.narrow = marks == NARROW
+        scale_facet_t(*at, address_of(exponents), address_of(self.t))
         self.keep = np.ones(len(hits), dtype=bool)
-        self.corners = FacetCorners(body.tree)
+        self.corners = body.tree.triangles[hits[:, layout.PLACE].astype(np.int64)].reshape(-1, 3, 3)
 
     def settle(self, every: bool) -> None:
         """Put the hits of each ray in order, exactly, and drop hits beyond the limit; keep the first only, or all.
         """
-        if not every and self.narrow.all() and (self.ray[1:] > self.ray[:-1]).all():
-            self.order = np.arange(len(self.ray))
+        if not every and (self.groups[:, 1:3] == (1, NARROW)).all():  # each ray's first hit ends before others begin
+            self.order = self.groups[:, 0]
             return
         order = np.lexsort((self.facet, self.t[:, 1], self.ray))
         ray, lower = self.ray[order], self.t[order, 1]
@@ -102,7 +100,7 @@ class _MetFacets:
         exponent = int(self.exponents[k])
         values = {}
         for row in rows.tolist():
-            corners = placed(X, self.corners[self.facet[row]])
+            corners = placed(X, self.corners[row])
             ((origin,), triangle), grid = on_one_grid(exact_point(self.rays[k, :3]), corners)
             t = enters(triangle, origin, (direction[0], direction[1], direction[2]))
             values[row] = t * Fraction(2) ** (grid - direction_at - exponent)
@@ -116,7 +114,7 @@ class _MetFacets:
         ray, facet = self.ray[rows], self.facet[rows]
         X = self.X_WA[ray] if len(self.X_WA) > 1 else self.X_WA
         proven = np.ones(len(rows), dtype=bool)
-        normals = facet_normals(X, self.corners[facet])
+        normals = facet_normals(X, self.corners[rows])
         return RayEvents(ray, self.t[rows], normals, facet, np.zeros(len(rows), dtype=np.int64), proven, proven.copy())
 
 

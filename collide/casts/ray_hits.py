@@ -8,6 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.casts.directions import Directions
+from collide.casts.ray_ends import first_places, write_places
+from collide.kernels import address_of
 from collide.results import only_value
 
 #: Rows of a World's hits, of kernels too; `collide.worlds.hits` says what the fields are.
@@ -93,20 +95,12 @@ def in_order(events: RayEvents) -> RayEvents:
 
 def first_of_each(events: RayEvents) -> RayEvents:
     """Of events in order the first of each ray, its bracket and what is certain of it with regard to the others."""
-    ray = events.ray
-    starts = np.flatnonzero(np.diff(ray, prepend=-1))
-    first = events.of(starts)
-    if not len(starts) or len(starts) == len(ray):
-        return first
-    t = first.t.copy()
-    t[:, 1] = np.minimum.reduceat(events.t[:, 1], starts)
-    upper = np.minimum.reduceat(np.where(events.proven, events.t[:, 2], np.inf), starts)
-    t[:, 2] = np.where(np.isinf(upper), np.maximum.reduceat(events.t[:, 2], starts), upper)
-    matters = events.t[:, 1] <= np.repeat(t[:, 2], np.diff([*starts, len(ray)]))
-    certified = np.logical_and.reduceat(events.certified | ~matters, starts)
-    return first._replace(
-        t=t, proven=np.logical_or.reduceat(events.proven, starts), certified=certified
-    )
+    n = len(events.ray)
+    t, flags = np.ascontiguousarray(events.t).copy(), np.stack([events.proven, events.certified], axis=1)
+    columns, first = np.stack([events.ray, events.facet, events.item], axis=1), np.empty(n, dtype=np.int64)
+    count = first_places(address_of(t), address_of(columns), address_of(flags), n, address_of(first))
+    rows = first[:count]
+    return events.of(rows)._replace(t=t[rows], proven=flags[rows, 0], certified=flags[rows, 1])
 
 
 def as_hits(events: RayEvents, origins: np.ndarray, directions: Directions, *, every: bool, single: bool) -> RayHits:
@@ -115,9 +109,10 @@ def as_hits(events: RayEvents, origins: np.ndarray, directions: Directions, *, e
     if not every:
         events = first_of_each(events)
     ray, t = events.ray, events.t
-    step = np.ldexp(directions.vectors[ray], directions.exponents[ray, None])
+    points, held = np.empty((len(ray), 3)), [np.ascontiguousarray(values) for values in (origins, *directions, ray, t)]
+    write_places(*map(address_of, held), len(ray), address_of(points))
     columns = (
-        np.ones(len(ray), dtype=bool), t[:, 0], t[:, 1], t[:, 2], origins[ray] + t[:, :1] * step, events.normal,
+        np.ones(len(ray), dtype=bool), t[:, 0], t[:, 1], t[:, 2], points, events.normal,
         events.facet, None, events.certified, events.item,
     )
     if every:

@@ -11,15 +11,9 @@ import numpy as np
 from collide.broadphase.box_tree import BoxTree
 from collide.casts.cut_parts import (
     FIRST,
-    FIRST_LOWER,
-    FIRST_NORMAL,
     FIRST_SIDE,
-    FIRST_UPPER,
     LAST,
-    LAST_LOWER,
-    LAST_NORMAL,
     LAST_SIDE,
-    LAST_UPPER,
     RAY,
     RAY_ROW,
     STATE,
@@ -28,17 +22,15 @@ from collide.casts.cut_parts import (
 from collide.casts.directions import Directions
 from collide.casts.exact_cast import cast_exactly, corners_of
 from collide.casts.posed_parts import PosedParts
+from collide.casts.ray_ends import list_open_chords, write_chord_ends
 from collide.casts.ray_hits import RayEvents
-from collide.casts.rays_in_tree import MAX_WIDTH, TREE_RAY_DOUBLES, TREE_RAY_INTEGERS, parts_on_rays
-from collide.curved.chords import MET, MISSED, UNCLEAR
+from collide.casts.rays_in_tree import TREE_RAY_DOUBLES, TREE_RAY_INTEGERS, parts_on_rays
+from collide.curved.chords import MET
 from collide.kernels import address_of
-from collide.lowering.packed_convex import HALFSPACE, POINTS
+from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.shape_table import PoseTable, ShapeTable
 from collide.numerics.exact_points import integers, rounded
 from collide.numerics.exact_vectors import inner
-
-#: Columns of both ends of a chord: from below, the value, from above.
-_BRACKETS = [FIRST_LOWER, LAST_LOWER], [FIRST, LAST], [FIRST_UPPER, LAST_UPPER]
 
 
 class _Workspace(local):
@@ -68,18 +60,16 @@ def parts_met(
             *parts.table.addresses, address_of(parts.poses.rows), address_of(parts.shape_of), address_of(questions),
             address_of(rays), len(questions), every, address_of(rows), *_workspace.addresses,
         )
-    limits = directions.limits(limit)[questions[:, 0]]
-    met = np.flatnonzero(rows[:, STATE] != MISSED)
-    rows, asked, limits = rows[met], questions[met], limits[met]
-    exact, ends = np.zeros(len(rows), dtype=bool), _ends_of(rows)
-    is_open = _are_open(rows, ends, limits)
-    if every:  # flat parts, and rays that touch: is it one place, or two?
-        is_open |= rows[:, FIRST_UPPER] >= rows[:, LAST_LOWER]
-    for k in np.flatnonzero(is_open).tolist():
-        if _has_exact_numbers(parts, asked[k, 1]):
-            exact[k] = True
-            _settle(parts, asked[k], origins, directions.vectors, limits[k], rows[k])
-    return _events(rows, met, asked, limits, exact, _ends_of(rows) if exact.any() else ends, directions)
+    limits, k = directions.limits(limit)[questions[:, 0]], len(questions)
+    listed, exact = np.empty(k, dtype=np.int64), np.zeros(k, dtype=np.uint8)
+    of_chords = address_of(questions), address_of(rows), address_of(limits), k
+    count = list_open_chords(
+        *parts.table.addresses, address_of(parts.shape_of), *of_chords, every, address_of(listed)
+    )
+    for i in listed[:count].tolist():
+        exact[i] = True
+        _settle(parts, questions[i], origins, directions.vectors, limits[i], rows[i])
+    return _events(rows, questions, limits, exact, np.ascontiguousarray(directions.exponents))
 
 
 class TreeOfParts(NamedTuple):
@@ -137,59 +127,18 @@ def _as_rays(origins: np.ndarray, directions: Directions) -> np.ndarray:
     return rays
 
 
-class _Ends(NamedTuple):
-    """Both ends of k chords, (k, 2): value, lower, upper of t.   wide : bracketed too widely to be certified."""
-
-    value: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
-    wide: np.ndarray
-
-
-def _ends_of(rows: np.ndarray) -> _Ends:
-    lower, value, upper = (rows[:, columns] for columns in _BRACKETS)
-    far = np.where(np.isfinite(value), np.abs(value), 0.0).max(axis=1, keepdims=True)
-    with np.errstate(invalid="ignore"):
-        wide = np.isfinite(upper) & np.isfinite(lower) & ~(upper - lower <= MAX_WIDTH * far)
-    return _Ends(value, lower, upper, wide)
-
-
-def _are_open(rows: np.ndarray, ends: _Ends, limits: np.ndarray) -> np.ndarray:
-    """(k,) bool: chords not decided by doubles, or with ends bracketed too widely: both sides of the origin or of the
-    limit are possible.
-    """
-    _, lower, upper, wide = ends
-    is_ahead, is_before = upper >= 0.0, lower <= limits[:, None]
-    is_open = (lower <= 0.0) & is_ahead | is_before & (upper > limits[:, None]) | wide & is_ahead & is_before
-    return is_open.any(axis=1) | (rows[:, STATE] == UNCLEAR)
-
-
-def _events(rows, met, asked, limits, exact, ends: _Ends, directions: Directions) -> RayEvents:
+def _events(rows, questions, limits, exact, exponents) -> RayEvents:
     """The ends of chords that count, from the origin to the limit: first ends, then last ends."""
-    value, lower, upper, wide = ends
-    limit = limits[:, None]
-    counts = np.isfinite(value) & (upper >= 0.0) & (lower <= limit)
-    proven = (rows[:, STATE] == MET)[:, None] & (lower >= 0.0) & (upper <= limit)
-    if exact.any():  # what was decided exactly is as it is said, within doubles that hold it
-        counts &= ~exact[:, None] | ((value >= 0.0) & (value <= limit))
-        proven |= exact[:, None]
-    last, k = np.nonzero(counts.T)
-    t = np.clip(np.stack([value[k, last], lower[k, last], upper[k, last]], axis=1), 0.0, None)
-    t[:, :2] = np.minimum(t[:, :2], limits[k, None])
-    ray, is_proven = asked[k, 0], proven[k, last]
-    with np.errstate(over="ignore", under="ignore"):
-        t = np.ldexp(t, -directions.exponents[ray, None])
-    normal = rows[:, FIRST_NORMAL : LAST_NORMAL + 3].reshape(-1, 2, 3)[k, last]
-    side = rows[k, FIRST_SIDE + last].astype(np.int64)
-    return RayEvents(ray, t, normal, side, met[k], is_proven, is_proven & ~wide[k, last])
+    k = len(rows)
+    t, normals, columns = np.empty((2 * k, 3)), np.empty((2 * k, 3)), np.empty((2 * k, 3), dtype=np.int64)
+    flags = np.empty((2 * k, 2), dtype=bool)
+    chords = *map(address_of, (rows, questions, limits, exponents, exact)), k
+    count = write_chord_ends(*chords, *map(address_of, (t, normals, columns, flags)))
+    (ray, side, item), (proven, certified) = columns[:count].T.copy(), flags[:count].T.copy()
+    return RayEvents(ray, t[:count], normals[:count], side, item, proven, certified)
 
 
 # --- exactly ------------------------------------------------------------------------------------
-
-
-def _has_exact_numbers(parts: PosedParts, part: int) -> bool:
-    packed = parts.packed(part)
-    return packed.kind in (POINTS, HALFSPACE) and not (packed.radius or packed.slop)
 
 
 def _settle(parts: PosedParts, asked, origins, vectors, limit: float, row: np.ndarray) -> None:

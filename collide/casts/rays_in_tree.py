@@ -19,6 +19,7 @@ from collide.casts.cut_parts import (
     FIRST_UPPER,
     LAST_LOWER,
     LAST_UPPER,
+    MAX_WIDTH,
     RAY,
     RAY_DOUBLES,
     RAY_ROW,
@@ -41,8 +42,6 @@ _WALL_DOUBLES = 10
 #: Doubles and integers of workspace: of a chord, its row, of the nodes that wait, and of a wall.
 TREE_RAY_DOUBLES = RAY_DOUBLES + RAY_ROW + _STACK + 3 + _WALL_DOUBLES
 TREE_RAY_INTEGERS = CAST_INTEGERS + _STACK
-#: Brackets wider than this, in units of t of the far side, are not certified.
-MAX_WIDTH = 2.0**-36
 
 # Integers of a tree of parts in memory; the last two: bodies without a box.
 NODES_AT, LINKS_AT, N_NODES, FIRST_AT, N_BODIES, SKIPPED_AT, MESHED_AT, UNBOUNDED_AT, N_UNBOUNDED = range(9)

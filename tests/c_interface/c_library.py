@@ -40,6 +40,13 @@ class Motions(ctypes.Structure):
     ]
 
 
+#: Rows of `collide_ray_hit`.
+RAY_HIT = np.dtype(
+    [
+        ("distance", "f8"), ("lower", "f8"), ("upper", "f8"), ("normal", "f8", 3), ("point", "f8", 3),
+        ("facet", "i4"), ("item", "i4"), ("hit", "?"), ("certified", "?"), ("reserved", "u1", 6),
+    ]
+)
 #: Rows of `collide_time_of_impact`.
 TIME_OF_IMPACT = np.dtype(
     [
@@ -108,6 +115,18 @@ _TYPES = {
     "collide_impact": [c_void_p] * 9 + [c_double, c_uint, c_void_p],
     "collide_impact_batch": [
         c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_uint, c_void_p, c_void_p, POINTER(c_size_t),
+    ],
+    "collide_raycast": [
+        c_void_p, c_void_p, Poses, Vectors, Vectors, c_double, c_uint, c_void_p, c_void_p, POINTER(c_size_t),
+    ],
+    "collide_mesh_raycast": [
+        c_void_p, c_void_p, Poses, Vectors, Vectors, c_double, c_uint, c_void_p, c_void_p, POINTER(c_size_t),
+    ],
+    "collide_compound_create": [c_void_p, c_void_p, c_size_t, c_void_p],
+    "collide_compound_free": [c_void_p],
+    "collide_compound_collide": [c_void_p, c_void_p, c_void_p, Poses, Poses, c_uint, c_void_p, POINTER(c_size_t)],
+    "collide_compound_distance": [
+        c_void_p, c_void_p, c_void_p, Poses, Poses, c_double, c_uint, c_void_p, POINTER(c_size_t),
     ],
     "collide_mesh_create": [c_void_p, c_size_t, c_void_p, c_size_t, c_int, c_void_p],
     "collide_mesh_of_shape": [c_void_p, c_void_p],
@@ -208,6 +227,27 @@ class CMesh:
     def __del__(self):
         if getattr(self, "handle", None):
             library().collide_mesh_free(self.handle)
+
+
+def raw_compound(shapes: list[CShape | None], poses) -> tuple[int, int | None]:
+    """(status, handle) of a union."""
+    handles = (c_void_p * max(len(shapes), 1))(*(None if shape is None else shape.handle for shape in shapes))
+    poses, out = _doubles(poses), c_void_p()
+    status = library().collide_compound_create(handles, poses.ctypes.data, len(shapes), ctypes.byref(out))
+    return status, out.value
+
+
+class CCompound:
+    """A Compound of Python, no item of which is another or a mesh, made once more in C; or of a convex shape."""
+
+    def __init__(self, shape: collide.Shape):
+        items = shape.items if isinstance(shape, collide.Compound) else ((shape, np.eye(4)),)
+        self._parts, self._free = [CShape(item) for item, _ in items], library().collide_compound_free
+        status, self.handle = raw_compound(self._parts, np.array([X for _, X in items]))
+        assert status == OK, (shape, library().collide_status_text(status))
+
+    def __del__(self):
+        self._free(self.handle)
 
 
 def raw_cloud(points, radii) -> tuple[int, int | None]:
@@ -368,6 +408,31 @@ class Asker:
             statuses.ctypes.data, failed,
         )
         return status, rows, statuses, failed.value
+
+    def rays(self, shape: CShape | CMesh, X_WA, origins, directions, limit: float = math.inf, flags: int = 0):
+        """(status, rows, their statuses, number of the ray to blame)."""
+        X_WA, failed = _doubles(X_WA).reshape(-1, 4, 4), c_size_t(0)
+        origins, directions = (_doubles(values).reshape(-1, 3) for values in (origins, directions))
+        n = max(len(X_WA), len(origins), len(directions))
+        rows, statuses = np.full(n, 7, dtype=RAY_HIT), np.full(n, -1, dtype=np.int32)
+        name = "collide_mesh_raycast" if isinstance(shape, CMesh) else "collide_raycast"
+        status = getattr(library(), name)(
+            self.handle, shape.handle, Poses(X_WA.ctypes.data, len(X_WA)), Vectors(origins.ctypes.data, len(origins)),
+            Vectors(directions.ctypes.data, len(directions)), limit, flags, rows.ctypes.data, statuses.ctypes.data,
+            failed,
+        )
+        return status, rows, statuses, failed.value
+
+    def compounds(self, A: CCompound, B: CCompound, X_WA, X_WB, *, boolean: bool, flags: int = 0, limit=math.inf):
+        """(status, answers, number of the pair to blame)."""
+        X_WA, X_WB, failed = _doubles(X_WA).reshape(-1, 4, 4), _doubles(X_WB).reshape(-1, 4, 4), c_size_t(0)
+        n = max(len(X_WA), len(X_WB)) if len(X_WA) and len(X_WB) else 0
+        out = np.full(n, 7, dtype=np.uint8) if boolean else np.zeros(n, dtype=PAIR_DTYPE)
+        poses = Poses(X_WA.ctypes.data, len(X_WA)), Poses(X_WB.ctypes.data, len(X_WB))
+        rest = [flags] if boolean else [limit, flags]
+        function = getattr(library(), f"collide_compound_{'collide' if boolean else 'distance'}")
+        status = function(self.handle, A.handle, B.handle, *poses, *rest, out.ctypes.data, failed)
+        return status, out.astype(bool) if boolean else out, failed.value
 
     def meshes_meet(self, A: CMesh, B: CMesh, X_WA, X_WB, flags: int = 0) -> tuple[int, bool]:
         hit, X_WA, X_WB = c_int(), _doubles(X_WA), _doubles(X_WB)

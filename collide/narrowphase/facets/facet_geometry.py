@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from typing import TypeVar
 
 import numpy as np
 
+from collide.kernels import address_of, entry, kernel, view_f64, view_i64
 from collide.mesh.bvh import MeshTree
+from collide.numerics import vec3
 from collide.numerics.exact_points import Point, integers, leading_digits, placed
 from collide.numerics.exact_vectors import Exact, cross, inner, minus
+from collide.numerics.vec3 import Vec3, dot, put_vec3, sub, vec3_at
 
 Vector = tuple[Exact, Exact, Exact]
 Direction = TypeVar("Direction", bound=tuple)
@@ -44,21 +48,46 @@ def facet_normals(X: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """(k, 3) unit normals in W of facets (k, 3, 3) under poses (k, 4, 4) or (1, 4, 4); 0 of those without area,
     exactly.
     """
-    c = np.ascontiguousarray(corners.transpose(1, 2, 0))
-    u, v = c[1] - c[0], c[2] - c[0]  # a row an axis: quicker by far than rows of three
-    sizes = np.maximum(np.abs(u).max(axis=0), np.abs(v).max(axis=0))
-    sizes[sizes == 0.0] = 1.0
-    u, v = (
-        [X[:, i, 0] * w[0] + X[:, i, 1] * w[1] + X[:, i, 2] * w[2] for i in range(3)] for w in (u / sizes, v / sizes)
-    )
-    n = np.stack([u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]], axis=1)
-    lengths = np.sqrt(n[:, 0] * n[:, 0] + n[:, 1] * n[:, 1] + n[:, 2] * n[:, 2])
-    for k in np.flatnonzero(~(lengths > _MIN_LENGTH)).tolist():
+    X, corners = np.ascontiguousarray(X), np.ascontiguousarray(corners)
+    n, listed = np.empty((len(corners), 3)), np.empty(len(corners), dtype=np.int64)
+    step = 16 if len(X) > 1 else 0
+    count = write_facet_normals(address_of(X), step, address_of(corners), len(n), address_of(n), address_of(listed))
+    for k in listed[:count].tolist():
         (p, q, r), _ = placed(X[k if len(X) > 1 else 0], corners[k])
-        n[k] = leading_digits(cross(minus(q, p), minus(r, p)))
-        lengths[k] = np.sqrt(np.square(n[k]).sum())
-    lengths = lengths[:, None]
-    return np.where(lengths > 0.0, n / np.where(lengths > 0.0, lengths, 1.0), 0.0) + 0.0
+        exact = leading_digits(cross(minus(q, p), minus(r, p)))
+        length = np.sqrt(np.square(exact).sum())
+        n[k] = (exact / length if length > 0.0 else np.zeros(3)) + 0.0
+    return n
+
+
+@entry("int64(int64, int64, int64, int64, int64, int64)")
+def write_facet_normals(X_at, step, corners_at, n, normals_at, listed_at):
+    """Write the unit normals in W of n facets, corners of 9 doubles each; slivers, whose normal needs exact numbers,
+    are listed. Returns how many are listed.
+
+    X : the facets' poses, step 16, or 0 of a single one.   listed : room for n numbers.
+    """
+    normals, listed, count = view_f64(normals_at, 3 * n), view_i64(listed_at, n), 0
+    for k in range(n):
+        corners, X = view_f64(corners_at + 72 * k, 9), view_f64(X_at + 8 * step * k, 16)
+        a = vec3_at(corners, 0)
+        u, v = sub(vec3_at(corners, 3), a), sub(vec3_at(corners, 6), a)
+        size = max(abs(u.x), abs(u.y), abs(u.z), abs(v.x), abs(v.y), abs(v.z))
+        size = size if size > 0.0 else 1.0
+        n_W = vec3.cross(_turned(X, u, size), _turned(X, v, size))
+        length = math.sqrt(dot(n_W, n_W))
+        if not length > _MIN_LENGTH:
+            listed[count] = k
+            count += 1
+            length = 1.0
+        put_vec3(normals, 3 * k, Vec3(n_W.x / length + 0.0, n_W.y / length + 0.0, n_W.z / length + 0.0))
+    return count
+
+
+@kernel(inline=True)
+def _turned(X, u, size):
+    v = Vec3(u.x / size, u.y / size, u.z / size)
+    return Vec3(dot(vec3_at(X, 0), v), dot(vec3_at(X, 4), v), dot(vec3_at(X, 8), v))
 
 
 def ray_crossing(direction: Direction, a: Vector, b: Vector, c: Vector) -> int | None:

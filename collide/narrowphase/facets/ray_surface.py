@@ -53,9 +53,10 @@ from collide.numerics.vec3 import Vec3, absolute, divide, dot, vec3_at
 RAY = 8
 _T, _LIMIT = 6, 7
 #: Doubles of a hit: number of the ray, of the facet, t from below, t, t from above, and 1 where t is to be worked out
-#: exactly: the ray lies in the facet's plane, or doubles could not tell whether they meet.
-HIT = 6
-RAY_OF, FACET_OF, LOWER, VALUE, UPPER, OPEN = range(HIT)
+#: exactly: the ray lies in the facet's plane, or doubles could not tell whether they meet; the facet's place in the
+#: tree.
+HIT = 7
+RAY_OF, FACET_OF, LOWER, VALUE, UPPER, OPEN, PLACE = range(HIT)
 
 # Progress, integers: the ray, the hits found.
 AT_RAY, N_HITS = range(2)
@@ -117,6 +118,7 @@ def _test_facet(query, a):
     query.hits[at + VALUE] = min(max(t.y, 0.0), t.z)
     query.hits[at + UPPER] = max(t.z, 0.0)
     query.hits[at + OPEN] = 1.0 if verdict == AMBIGUOUS else 0.0
+    query.hits[at + PLACE] = a
     query.progress[N_HITS] += 1
     if query.first_only:
         out[_BEST] = min(out[_BEST], t.z)

@@ -1,0 +1,147 @@
+"""Unions of convex shapes through the C interface: booleans and rows are Python's, bit by bit, one pose or many.
+
+Whether Python's are right is judged in `tests/narrowphase/composite`.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from concurrent.futures import ThreadPoolExecutor
+
+import c_library as c
+import numpy as np
+import pytest
+import soak_pairs
+
+import collide
+from collide.kernels import mode
+
+if mode.MODE != mode.COMPILED:
+    pytest.skip(f"kernels are not those of the library: {mode.WHY}", allow_module_level=True)
+
+CONVEX = ("sphere", "box", "capsule", "hull", "swept hull", "half-space", "cylinder", "cone", "ellipsoid")
+
+
+def union(random: np.random.Generator, size: float, n: int) -> collide.Compound:
+    """n bounded convex shapes of a tenth to half a size, some flush with each other, within about a size."""
+    items = []
+    for _ in range(n):
+        kind = str(random.choice([kind for kind in CONVEX if kind != "half-space"]))
+        X = soak_pairs.rotation(random)
+        X[:3, 3] = size * random.uniform(-1, 1, 3)
+        if random.uniform() < 0.3:
+            X[:3, 3] = size * np.round(4 * random.uniform(-1, 1, 3)) / 4
+        items.append((soak_pairs.shape(kind, size * random.uniform(0.1, 0.5), random), X))
+    return collide.Compound(items)
+
+
+@functools.cache
+def drawn() -> list[tuple]:
+    """(name, A, B, X_WA, X_WB): a union with a union or a convex shape, near each other, either of them first."""
+    cases = []
+    for number in range(220):
+        random = np.random.default_rng([111, number])
+        size = 10.0 ** random.uniform(-2, 2)
+        A = union(random, size, int(random.choice([1, 2, 3, 8, 40])))
+        if number % 3:
+            B = union(random, size * random.uniform(0.2, 1), int(random.choice([1, 2, 5, 20])))
+        else:
+            B = soak_pairs.shape(str(random.choice(CONVEX)), size, random)
+        X_WA, X_WB = soak_pairs.rotation(random), soak_pairs.rotation(random)
+        X_WA[:3, 3] = size * random.normal(size=3) * random.choice([0.0, 1.0, 1e3])
+        X_WB[:3, 3] = X_WA[:3, 3] + size * random.normal(size=3) * random.choice([0.1, 0.4, 1.5])
+        if number % 5 == 0:  # about to touch
+            row = collide.distance(A, B, X_WA, X_WB, signed=False)
+            X_WB[:3, 3] -= row.distance * row.normal
+        cases.append((f"case {number}", *((A, B) if number % 2 else (B, A)), X_WA, X_WB))
+    return cases
+
+
+@functools.cache
+def made() -> list[tuple]:
+    return [(c.CCompound(A), c.CCompound(B)) for _, A, B, *_ in drawn()]
+
+
+@functools.cache
+def answers() -> list[tuple]:
+    """Python's boolean, row with a depth, row without, row up to a limit, and that limit."""
+    told = []
+    for number, (_, A, B, X_WA, X_WB) in enumerate(drawn()):
+        X, limit = (X_WA[None], X_WB), float(np.linalg.norm(X_WB[:3, 3] - X_WA[:3, 3])) * (number % 4) * 0.1
+        told.append((
+            collide.collide(A, B, *X), collide.distance(A, B, *X).rows, collide.distance(A, B, *X, signed=False).rows,
+            collide.distance(A, B, *X, max_distance=limit).rows, limit,
+        ))
+    return told
+
+
+def differences(_=None) -> list[str]:
+    asker, wrong = c.Asker(), []
+    for (name, _, _, X_WA, X_WB), pair, (hit, row, gap, near, limit) in zip(drawn(), made(), answers()):
+        asked = [
+            (hit, {"boolean": True}), (row, {"boolean": False}), (gap, {"boolean": False, "flags": c.UNSIGNED}),
+            (near, {"boolean": False, "limit": limit}),
+        ]
+        for wanted, how in asked:
+            status, found, _ = asker.compounds(*pair, X_WA, X_WB, **how)
+            if (status, found.tobytes()) != (c.OK, wanted.tobytes()):
+                wrong.append(f"{name}, {how}: status {status}, C {found}, Python {wanted}")
+    return wrong
+
+
+def test_single_poses_have_pythons_bits():
+    wrong = differences()
+    assert not wrong, f"{len(wrong)} differ, the first: {wrong[0]}"
+    hits = np.array([hit for hit, *_ in answers()])
+    beyond = sum(bool(near["beyond"][0]) for *_, near, _ in answers())
+    parts = sum(bool(row["part_a"][0] or row["part_b"][0]) for _, row, *_ in answers())
+    assert 50 <= hits.sum() <= 170 and beyond >= 60 and parts >= 80, (hits.sum(), beyond, parts)
+
+
+def test_four_threads_at_once_have_pythons_bits():
+    answers(), made()
+    with ThreadPoolExecutor(4) as pool:
+        wrong = [what for some in pool.map(differences, range(4)) for what in some]
+    assert not wrong, f"{len(wrong)} differ, the first: {wrong[0]}"
+
+
+def test_batches_have_pythons_bits():
+    asker, hits = c.Asker(), 0
+    for number, ((name, A, B, X_WA, X_WB), pair) in list(enumerate(zip(drawn(), made())))[::6]:
+        random = np.random.default_rng([112, number])
+        moved = np.stack([X_WB] * 90)
+        moved[:, :3, 3] += random.normal(size=(90, 3)) * np.linalg.norm(X_WB[:3, 3] - X_WA[:3, 3])
+        poses = (X_WA, moved) if number % 2 else (moved, X_WA)
+        for boolean in (True, False):
+            wanted = collide.collide(A, B, *poses) if boolean else collide.distance(A, B, *poses).rows
+            status, found, _ = asker.compounds(*pair, *poses, boolean=boolean)
+            assert (status, found.tobytes()) == (c.OK, wanted.tobytes()), (name, boolean)
+            hits += int(wanted.sum()) if boolean else 0
+    assert hits >= 300, hits
+
+
+def test_what_python_refuses_is_refused():
+    asker, box = c.Asker(), c.CShape(collide.Box(1, 1, 1))
+    pair = c.CCompound(collide.Compound([(collide.Box(1, 1, 1), np.eye(4)), (collide.Sphere(1), np.eye(4))]))
+    assert c.raw_compound([], np.zeros((0, 4, 4)))[0] == c.INVALID_SHAPE
+    assert c.raw_compound([None], np.eye(4))[0] == c.INVALID_ARGUMENT
+    for bad in c.odd_poses():
+        assert c.raw_compound([box, box], np.stack([np.eye(4), bad]))[0] == c.INVALID_POSE
+        with pytest.raises(collide.InvalidPose):
+            collide.Compound([(collide.Sphere(1), np.eye(4)), (collide.Sphere(1), bad)])
+    for number, bad in enumerate(c.odd_poses()):
+        many = np.stack([np.eye(4)] * 20)
+        many[13] = bad
+        status, _, failed = asker.compounds(pair, pair, np.eye(4), many, boolean=True)
+        assert (status, failed) == (c.INVALID_POSE, 13), number
+    planes = collide.Compound([(collide.Halfspace((0, 0, 1), 0.0), np.eye(4)), (collide.Sphere(1.0), np.eye(4))])
+    own = c.CCompound(planes)
+    with pytest.raises(collide.UnsupportedQuery):
+        collide.distance(planes, planes, np.eye(4), np.eye(4))
+    assert asker.compounds(own, own, np.eye(4), np.eye(4), boolean=False)[0] == c.ENDLESS_DEPTH
+    assert asker.compounds(own, own, np.eye(4), np.eye(4), boolean=True)[:2] == (c.OK, [True])
+    for limit in (-1.0, math.nan):
+        assert asker.compounds(pair, pair, np.eye(4), np.eye(4), boolean=False, limit=limit)[0] == c.INVALID_ARGUMENT
+    assert asker.compounds(pair, pair, np.eye(4), np.eye(4), boolean=True, flags=4)[0] == c.INVALID_ARGUMENT
+    assert asker.compounds(pair, pair, [np.eye(4)] * 2, [np.eye(4)] * 3, boolean=True)[0] == c.INVALID_ARGUMENT
