@@ -35,7 +35,8 @@ BUILD = ROOT / "build" / "kernels"
 C_SOURCES = [
     "kernels.c", "capi_arena.c", "capi_mesh.c", "capi_mesh_pairs.c", "capi_pairs.c", "capi_shapes.c", "capi_status.c",
     "capi_tree.c", "capi_contacts.c", "capi_axis.c", "capi_faces.c", "capi_contact_queries.c",
-    "capi_casts.c", "capi_impact.c", "capi_rays.c", "capi_compound.c", "capi_compound_pairs.c",
+    "capi_casts.c", "capi_impact.c", "capi_rays.c", "capi_within.c", "capi_compound.c", "capi_compound_pairs.c",
+    "capi_mesh_contacts.c", "capi_mesh_shapes.c", "capi_compound_contacts.c",
     "capi_field.c", "capi_field_cells.c", "capi_field_items.c", "capi_field_pairs.c",
     "host_mujoco.c", "host_slots.c", "host_terrain.c",
     "host_terrain_bodies.c", "host_terrain_deep.c", "host_terrain_facets.c", "host_terrain_near.c",

@@ -45,4 +45,7 @@ struct compound_space {
 collide_status take_compounds(collide_workspace *space, const collide_compound *A, const collide_compound *B);
 void free_compound_space(struct compound_space *space);
 
+/* capi_compound_contacts.c */
+void free_compound_contacts(struct compound_contact_space *space);
+
 #endif

@@ -1,6 +1,7 @@
 /* A field and a convex shape: walks down the field's tree, as collide/narrowphase/fields/field_pairs.py asks for them by
    collide/narrowphase/facets/nearest_item_calls.py. */
 #include "capi_field.h"
+#include "capi_mesh.h"
 
 /* Header of walks (collide/narrowphase/facets/item_questions.py), and how they end (nearest_item_kernel.py). */
 enum {
@@ -10,7 +11,6 @@ enum {
 };
 /* Floats of a probe (collide/mesh/box_overlap.py). */
 enum { PROBE_FLOATS = 38 };
-enum { LONG_WAY = -1, MAYBE_INSIDE, APART, MEETS };
 /* What `clouds_meet_balls` leaves open (collide/narrowphase/fields/ball_walk_kernel.py). */
 enum { OPEN_BALL = 2 };
 /* Widths of brackets that are promised, as a part of the size (collide/narrowphase/bounds.py): 2^-40 and 2^-26. */
@@ -84,23 +84,46 @@ static void set_box(const collide_shape *shape, double box[6])
     }
 }
 
-/* Prepare the walk for a pair: the item, of one corner or eight, stands first in the table, and in rank. */
-static void take_field(collide_workspace *space, const collide_field *field, const collide_shape *shape)
+/* Prepare the walk for a pair: an item of so many corners stands first in the table, and in rank. */
+static void take_items(collide_workspace *space, int64_t are, const int64_t *tree, int64_t corners, double reach, double radius,
+                       const collide_shape *shape)
 {
     struct field_workspace *walk = space->field;
     const double *promise = shape->ints[KIND] == POINTS ? &PROMISE_STORED : &PROMISE_CURVED;
-    walk->ints[COUNT] = field->are == BALLS ? 1 : 8;
-    walk->numbers[RADIUS] = field->radius;
+    walk->ints[COUNT] = corners;
+    walk->numbers[RADIUS] = radius;
     memcpy(walk->ints + INTS, shape->ints, sizeof shape->ints);
     memcpy(walk->numbers + NUMBERS, shape->numbers, sizeof shape->numbers);
     walk->ints[INTS + RANK] = 1;
     if (shape->ints[KIND] != HALFSPACE) set_box(shape, walk->box);
-    walk->header[WALK_TREE_AT] = address_of(field->tree);
-    walk->header[ITEMS_ARE] = field->are;
-    walk->header[RADII_AT] = address_of(field->radii);
-    memcpy(walk->header + REACH_OF_ITEMS, &field->reach, sizeof(double));
-    memcpy(walk->header + LARGEST_RADIUS, &field->radius, sizeof(double));
+    walk->header[WALK_TREE_AT] = address_of(tree);
+    walk->header[ITEMS_ARE] = are;
+    walk->header[RADII_AT] = 0;
+    memcpy(walk->header + REACH_OF_ITEMS, &reach, sizeof reach);
+    memcpy(walk->header + LARGEST_RADIUS, &radius, sizeof radius);
     memcpy(walk->header + PROMISE, promise, sizeof(double));
+}
+
+static void take_field(collide_workspace *space, const collide_field *field, const collide_shape *shape)
+{
+    take_items(space, field->are, field->tree, field->are == BALLS ? 1 : 8, field->reach, field->radius, shape);
+    space->field->header[RADII_AT] = address_of(field->radii);
+}
+
+int64_t ask_facets(collide_workspace *space, const collide_mesh *mesh, const collide_shape *shape, const double *X_WM,
+                   const double *X_WS, int boolean, int depths, collide_pair *row)
+{
+    const double *largest = mesh->numbers + CORNER;
+    double reach = sqrt(largest[0] * largest[0] + largest[1] * largest[1] + largest[2] * largest[2]) + mesh->radius;
+    int64_t header_at = address_of(space->field->header), state = 0, place, how, m[MEASURES];
+    workspace_sizes(space->kernels, m);
+    if (m[M_WIDTH] * (mesh->depth + 2) > m[M_CELL_STACK]) return LONG_WAY;
+    take_items(space, FACETS, mesh->tree, 3, reach, 0.0, shape);
+    if (!boolean)
+        return space->kernels->curved_gap_single(header_at, address_of(X_WM), address_of(X_WS), address_of(row), (uint8_t)depths, INFINITE);
+    space->kernels->curved_states_of(header_at, address_of(X_WM), address_of(X_WS), 1, 0.0, address_of(&state), address_of(&place),
+                                     address_of(&how));
+    return state;
 }
 
 /* LONG_WAY; MEETS; else the pair is farther apart than a margin, or with a margin above 0 may be nearer. */

@@ -84,6 +84,9 @@ struct manifold_space;
 struct cast_space;
 struct impact_space;
 struct compound_space;
+struct mesh_contact_space;
+struct compound_contact_space;
+struct collide_mesh;
 
 struct collide_shape {
     int64_t ints[INTS];
@@ -135,6 +138,9 @@ struct collide_workspace {
     struct cast_space *cast; /* of casts and rays; NULL until some are asked for */
     struct impact_space *impact; /* of motions; NULL until some are asked for */
     struct compound_space *compound; /* of unions; NULL until some are asked about */
+    struct mesh_contact_space *mesh_contacts; /* NULL until some are asked for */
+    struct compound_contact_space *compound_contacts; /* the same of unions */
+    struct collide_mesh *middle; /* a point at the origin, as a body of facets; NULL until it is asked for */
     void *held[3];
 };
 

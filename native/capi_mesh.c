@@ -117,6 +117,9 @@ static collide_status build_mesh(const struct collide_kernels *kernels, const do
 void collide_mesh_free(collide_mesh *mesh)
 {
     if (mesh == NULL) return;
+    collide_shape_free(mesh->hull);
+    free_topology(mesh->topology);
+    free(mesh->corners);
     free(mesh->points);
     free(mesh->held);
     free(mesh);
@@ -158,11 +161,13 @@ static collide_status mesh_of_facets(const double *vertices, int64_t n, const in
         mesh->solid = solid != COLLIDE_SURFACE && encloses;
         mesh->n_points = kernels->one_of_each_part(address_of(corners), address_of(shells), m, n, address_of(ids));
         mesh->points = malloc((size_t)(3 * mesh->n_points + 1) * sizeof *mesh->points);
+        mesh->corners = malloc((size_t)(3 * m) * sizeof *corners);
+        if (mesh->corners != NULL) memcpy(mesh->corners, corners, (size_t)(3 * m) * sizeof *corners);
         for (k = 0; mesh->points != NULL && k < mesh->n_points; k++)
             memcpy(mesh->points + 3 * k, vertices + 3 * (int64_t)ids[k], 3 * sizeof *vertices);
         for (k = 0; k < 3 * m; k++) wide[k] = faces[k];
         if (solid == COLLIDE_SOLID && !encloses) status = COLLIDE_INVALID_SHAPE;
-        else if (mesh->points != NULL) status = build_mesh(kernels, vertices, n, wide, m, mesh);
+        else if (mesh->points != NULL && mesh->corners != NULL) status = build_mesh(kernels, vertices, n, wide, m, mesh);
     }
     arena_end(&arena);
     return status;
@@ -232,11 +237,32 @@ static int64_t facets_of(const struct hull *hull, const double *points, int64_t 
     return 1;
 }
 
+/* Corners of facets of a hull: of equal points the first. */
+static int32_t *corners_of_hull(const struct collide_kernels *kernels, struct arena *arena, const double *points, int64_t n,
+                                const int64_t *faces, int64_t n_facets)
+{
+    int64_t size = 2, k;
+    int32_t *table, *first, *corners = malloc((size_t)(3 * n_facets) * sizeof *corners);
+    double *same = arena_take(arena, (size_t)(3 * n) * sizeof *same);
+    while (size <= n) size *= 2;
+    table = arena_take(arena, (size_t)size * sizeof *table);
+    first = arena_take(arena, (size_t)n * sizeof *first);
+    if (corners == NULL || arena->failed) {
+        arena->failed = 1;
+        return corners;
+    }
+    for (k = 0; k < 3 * n; k++) same[k] = points[k] + 0.0; /* minus zero is zero */
+    memset(table, -1, (size_t)size * sizeof *table);
+    kernels->first_rows(address_of(same), n, address_of(table), size, address_of(first));
+    for (k = 0; k < 3 * n_facets; k++) corners[k] = first[faces[k]];
+    return corners;
+}
+
 static collide_status mesh_of_hull(const collide_shape *shape, collide_mesh *mesh)
 {
     const struct collide_kernels *kernels = kernels_here();
     const double *coordinates = (const double *)(intptr_t)shape->ints[ADDRESS];
-    int64_t n = shape->ints[COUNT], padded = shape->ints[PADDED], k, *faces;
+    int64_t n = shape->ints[COUNT], padded = shape->ints[PADDED], n_facets, k, *faces;
     collide_status status = COLLIDE_NO_MEMORY;
     struct arena arena;
     struct hull hull;
@@ -254,7 +280,9 @@ static collide_status mesh_of_hull(const collide_shape *shape, collide_mesh *mes
             mesh->radius = shape->numbers[RADIUS];
             mesh->n_points = 1;
             memcpy(mesh->points, points + 3 * (int64_t)hull.vertices[0], 3 * sizeof *points);
-            status = build_mesh(kernels, points, n, faces, facets_of(&hull, points, faces), mesh);
+            n_facets = facets_of(&hull, points, faces);
+            mesh->corners = corners_of_hull(kernels, &arena, points, n, faces, n_facets);
+            if (!arena.failed) status = build_mesh(kernels, points, n, faces, n_facets, mesh);
         }
     }
     arena_end(&arena);

@@ -8,8 +8,10 @@
 enum {
     TREE_A, TREE_B, SOLID_A, SOLID_B, POINTS_A, POINTS_B, N_POINTS_A, N_POINTS_B, RADIUS_A, RADIUS_B, SAME_TREE, SAME_BODY, EXCHANGED,
     SURFACES_CODE, POINTS_CODE, DISTANCES_CODE, EXACT_CODE, STACK_AT, N_STACK, MESH_DOUBLES_AT, MESH_INTEGERS_AT, HEAP_AT, N_HEAP,
-    SCRATCH_AT, MESH_HEADER
+    SCRATCH_AT, WORDS_OF_PAIR
 };
+
+typedef char headers_agree[(int)WORDS_OF_PAIR == (int)MESH_HEADER && (int)EXCHANGED == (int)IS_EXCHANGED ? 1 : -1];
 /* More points than this are left to a batch. */
 enum { MAX_POINTS = 64 };
 
@@ -76,7 +78,7 @@ static void take_meshes(struct mesh_workspace *mesh, const collide_mesh *A, cons
 }
 
 /* Why a kernel left a pair to Python: matrices that are no poses, or something that C does not do. */
-static collide_status why(collide_workspace *space, const double *X_WA, const double *X_WB, unsigned flags)
+collide_status why_mesh_pair(collide_workspace *space, const double *X_WA, const double *X_WB, unsigned flags)
 {
     int64_t check = !(flags & COLLIDE_TRUST_POSES), pose_at = address_of(space->poses);
     if (space->kernels->first_bad_pose(address_of(X_WA), 0, 0, 1, (uint8_t)check, pose_at) == 0) return COLLIDE_INVALID_POSE;
@@ -84,7 +86,7 @@ static collide_status why(collide_workspace *space, const double *X_WA, const do
     return COLLIDE_UNSUPPORTED;
 }
 
-static collide_status check_pair(const collide_workspace *space, const collide_mesh *A, const collide_mesh *B, const double *X_WA,
+collide_status check_mesh_pair(const collide_workspace *space, const collide_mesh *A, const collide_mesh *B, const double *X_WA,
                                  const double *X_WB, unsigned flags)
 {
     if (space == NULL || A == NULL || B == NULL || X_WA == NULL || X_WB == NULL || !(A->given || B->given) ||
@@ -102,11 +104,11 @@ collide_status collide_mesh_collide(collide_workspace *workspace, const collide_
     int64_t result;
     if (hit == NULL) return COLLIDE_INVALID_ARGUMENT;
     *hit = 0;
-    if ((status = check_pair(workspace, A, B, X_WA, X_WB, flags)) != COLLIDE_OK) return status;
+    if ((status = check_mesh_pair(workspace, A, B, X_WA, X_WB, flags)) != COLLIDE_OK) return status;
     given = round_as_kernels_do();
     take_meshes(workspace->mesh, A, B);
     result = workspace->kernels->meet_single(address_of(workspace->mesh->header), address_of(X_WA), address_of(X_WB));
-    if (result < 0) status = why(workspace, X_WA, X_WB, flags);
+    if (result < 0) status = why_mesh_pair(workspace, X_WA, X_WB, flags);
     round_as_before(given);
     if (status == COLLIDE_OK) *hit = (int)result;
     return status;
@@ -119,13 +121,13 @@ collide_status collide_mesh_distance(collide_workspace *workspace, const collide
     rounding given;
     if (pair == NULL) return COLLIDE_INVALID_ARGUMENT;
     memset(pair, 0, sizeof *pair);
-    if ((status = check_pair(workspace, A, B, X_WA, X_WB, flags)) != COLLIDE_OK) return status;
+    if ((status = check_mesh_pair(workspace, A, B, X_WA, X_WB, flags)) != COLLIDE_OK) return status;
     given = round_as_kernels_do();
     take_meshes(workspace->mesh, A, B);
     if (workspace->kernels->gap_single(address_of(workspace->mesh->header), address_of(X_WA), address_of(X_WB), address_of(pair), 1,
                                        INFINITE) < 0) {
         memset(pair, 0, sizeof *pair);
-        status = why(workspace, X_WA, X_WB, flags);
+        status = why_mesh_pair(workspace, X_WA, X_WB, flags);
     }
     round_as_before(given);
     return status;
@@ -141,4 +143,10 @@ int64_t facets_on_ray(collide_workspace *space, const collide_mesh *mesh, const 
         address_of(progress), h[STACK_AT], STACK_OF_MESHES, h[MESH_DOUBLES_AT], h[MESH_INTEGERS_AT], h[EXACT_CODE]);
     *count = progress[1];
     return status;
+}
+
+const int64_t *mesh_pair_header(collide_workspace *space, const collide_mesh *A, const collide_mesh *B)
+{
+    take_meshes(space->mesh, A, B);
+    return space->mesh->header;
 }

@@ -102,7 +102,10 @@ void collide_workspace_free(collide_workspace *workspace)
     if (workspace->manifold != NULL) free_manifolds(workspace->manifold);
     free(workspace->manifold);
     free(workspace->impact);
+    free(workspace->mesh_contacts);
+    collide_mesh_free(workspace->middle);
     free_compound_space(workspace->compound);
+    free_compound_contacts(workspace->compound_contacts);
     free(workspace->held[0]);
     free(workspace->held[1]);
     free(workspace->held[2]);

@@ -202,6 +202,19 @@ COLLIDE_API collide_status collide_distance_each(collide_workspace *workspace, c
                                                  const int64_t *which, size_t n, collide_poses X_WA, collide_poses X_WB,
                                                  double max_distance, unsigned flags, collide_pair *pairs, size_t *failed);
 
+/* --- margins ---------------------------------------------------------------------------------------------------------- */
+
+/* Whether A and B are at most a margin apart, at n pairs of poses: Python's `security_margin`. margin : 0, or 1e-50 to 1e50 [m].
+   Exact for polytopes, swept by balls, and half-spaces, but where radii and margin do not sum up to a double beside a
+   half-space, or two doubles; those, and curved shapes, count as within where the bracket holds the margin. flags : COLLIDE_TRUST_POSES
+   or 0. Where one fails, *failed is its number, and the answers from there on are of no use.
+
+   Of unions and fields Python's answer is that of a row of collide_compound_distance or collide_field_distance with max_distance =
+   margin and COLLIDE_UNSIGNED: within where hit is 1 or lower <= margin. */
+COLLIDE_API collide_status collide_within(collide_workspace *workspace, const collide_shape *A, const collide_shape *B,
+                                          collide_poses X_WA, collide_poses X_WB, double margin, unsigned flags, uint8_t *within,
+                                          size_t *failed);
+
 /* --- contacts -------------------------------------------------------------------------------------------------------
 
    Where two bodies touch, overlap, or come within a margin: up to max_contacts points, with one normal. The first is the deepest;
@@ -353,11 +366,20 @@ COLLIDE_API collide_status collide_compound_distance(collide_workspace *workspac
                                                      const collide_compound *B, collide_poses X_WA, collide_poses X_WB,
                                                      double max_distance, unsigned flags, collide_pair *pairs, size_t *failed);
 
+/* Contacts of A and B, as those of their parts: at most max_contacts of each pair of parts, in the order of part_a and part_b; patch
+   counts the pairs. contacts : room for `capacity` rows. *count : how many there are. COLLIDE_TOO_MANY: more than that, of which as many
+   are written. COLLIDE_UNSUPPORTED, never a guess: parts that touch, or are apart by a margin, within rounding, half-spaces at poses of
+   their own, more than 256 pairs of parts that come within the margin, and more than 1024 contacts. */
+COLLIDE_API collide_status collide_compound_contacts(collide_workspace *workspace, const collide_compound *A,
+                                                     const collide_compound *B, const double X_WA[16], const double X_WB[16],
+                                                     double margin, size_t max_contacts, unsigned flags, collide_contact *contacts,
+                                                     size_t capacity, size_t *count);
+
 /* --- meshes --------------------------------------------------------------------------------------------------------
 
-   Triangles, as a solid or as a surface, asked about with each other and with polytopes. This is less than Python answers:
-   whether two such bodies meet, and how far they are apart. Everything else of meshes is COLLIDE_UNSUPPORTED, never a guess:
-   depths, gaps below 6e-8 of the pair's size, curved shapes, half-spaces, unions, solids against bodies of more than 64 parts. */
+   Triangles, as a solid or as a surface, asked about with each other and with convex shapes. This is less than Python answers:
+   whether two such bodies meet, how far they are apart, contacts, and rays. Everything else of meshes is COLLIDE_UNSUPPORTED, never a
+   guess: depths but of half-spaces, gaps below 6e-8 of the pair's size, unions, solids against bodies of more than 64 parts. */
 typedef struct collide_mesh collide_mesh;
 
 enum {
@@ -388,6 +410,26 @@ COLLIDE_API collide_status collide_mesh_collide(collide_workspace *workspace, co
 COLLIDE_API collide_status collide_mesh_distance(collide_workspace *workspace, const collide_mesh *A, const collide_mesh *B,
                                                  const double X_WA[16], const double X_WB[16], unsigned flags,
                                                  collide_pair *pair);
+
+/* A mesh, as made by collide_mesh_create, and a convex shape of any kind: whether they meet, and how far they are apart. The mesh stands
+   first; part_a is a facet. Half-spaces are answered by the mesh's hull, depths too, which is made at the first of them and kept.
+   COLLIDE_UNSUPPORTED, never a guess: depths of others, unless COLLIDE_UNSIGNED is asked for, what touches a curved shape within
+   rounding, h-polytopes, and what collide_mesh_collide and collide_mesh_distance leave to Python. */
+COLLIDE_API collide_status collide_mesh_shape_collide(collide_workspace *workspace, const collide_mesh *mesh,
+                                                      const collide_shape *shape, const double X_WM[16], const double X_WS[16],
+                                                      unsigned flags, int *hit);
+COLLIDE_API collide_status collide_mesh_shape_distance(collide_workspace *workspace, const collide_mesh *mesh,
+                                                       const collide_shape *shape, const double X_WM[16], const double X_WS[16],
+                                                       unsigned flags, collide_pair *pair);
+
+/* Contacts of A and B, patch by patch: at most max_contacts of each, and as many patches as there are. facet_a, facet_b, feature_a,
+   feature_b and patch of a row tell which. contacts : room for `capacity` rows. *count : how many there are. COLLIDE_TOO_MANY: more
+   than that, of which as many are written. COLLIDE_UNSUPPORTED, never a guess: bodies inside each other, overlaps too deep for a
+   patch, contacts within rounding of the margin, and more than 4096 pairs of facets or 1024 contacts. The first contacts of a mesh
+   work out which facets share corners and edges, O(n), which is kept with it; those of a workspace take 20 MB of addresses. */
+COLLIDE_API collide_status collide_mesh_contacts(collide_workspace *workspace, const collide_mesh *A, const collide_mesh *B,
+                                                 const double X_WA[16], const double X_WB[16], double margin, size_t max_contacts,
+                                                 unsigned flags, collide_contact *contacts, size_t capacity, size_t *count);
 
 /* --- rays ------------------------------------------------------------------------------------------------------------
 

@@ -60,7 +60,7 @@ _FEWEST_PAIRS, _KEPT_PAIRS, MAX_PAIRS = 1 << 12, 1 << 14, 1 << 18
 #: Space that has grown is kept for so many calls, at most 75 MB; to grow it again lists the pairs of one call twice.
 _CALLS_KEPT = 256
 #: Pairs of facets, and rows, that a single call has space for; calls of more are left to the long way.
-_PAIRS_OF_SINGLE_CALLS, _ROWS_OF_SINGLE_CALLS = 1 << 12, 1 << 10
+PAIRS_OF_SINGLE_CALLS, ROWS_OF_SINGLE_CALLS = 1 << 12, 1 << 10
 #: Rows there is space for to begin with, and so many more a pose.
 _FIRST_ROWS, _ROWS_PER_POSE = 64, 8
 #: Poses that are worth a thread of their own.
@@ -194,14 +194,14 @@ def single_facet_contacts(A: Shape, B: Shape) -> tuple[Single, Any] | None:
     header = np.zeros(FACETS_HEADER, dtype=np.int64)
     header[[KERNEL, N_ROWS]] = code_of(facet_manifolds), len(rows)
     header.view(np.float64)[REACH_OF_BOTH] = compound_parts(A).reach + compound_parts(B).reach
-    header[MANIFOLDS:] = _header_of(body_a, body_b, work, (address_of(words), _PAIRS_OF_SINGLE_CALLS, False))
+    header[MANIFOLDS:] = _header_of(body_a, body_b, work, (address_of(words), PAIRS_OF_SINGLE_CALLS, False))
     return prepared_contacts(contacts_single_facets, header, rows), (body_a, body_b, work, words)
 
 
 @cache
 def _space_of_single_calls() -> tuple[np.ndarray, np.ndarray]:
     """(workspace, rows), one for all: the kernels keep Python's lock."""
-    return np.empty(workspace_words(_PAIRS_OF_SINGLE_CALLS)), np.zeros(_ROWS_OF_SINGLE_CALLS, dtype=CONTACT_DTYPE)
+    return np.empty(workspace_words(PAIRS_OF_SINGLE_CALLS)), np.zeros(ROWS_OF_SINGLE_CALLS, dtype=CONTACT_DTYPE)
 
 
 class _OfThread(local):

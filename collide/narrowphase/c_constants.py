@@ -18,6 +18,7 @@ from collide.mesh.bvh import NODE, SLAB, WIDTH
 from collide.mesh.bvh import NUMBERS as TREE_NUMBERS
 from collide.mesh.mesh_topology import COUNTS
 from collide.narrowphase.exact.settle_space import WORKSPACE
+from collide.narrowphase.facets import facets_within as near_pairs
 from collide.narrowphase.facets import item_questions as items
 from collide.narrowphase.facets import mesh_collide_kernel as pairs
 from collide.narrowphase.facets import ray_surface as rays
@@ -32,7 +33,7 @@ from collide.numerics.number_digest import DIGEST_WORDS
 from collide.support.coarse_points import COARSE
 
 #: Doubles of a walk along meshes: of whichever takes most.
-_MESH_DOUBLES = max(module.DOUBLES + module.FLOATS for module in (surfaces, distances, inside, rays))
+_MESH_DOUBLES = max(module.DOUBLES + module.FLOATS for module in (surfaces, distances, inside, near_pairs, rays))
 
 #: In this order: rooms of the narrowphase, layouts, rooms of hulls and of support trees; layouts and rooms of
 #: box-trees, what is found out about surfaces, rooms of questions about meshes and of a digest; layouts and rooms of

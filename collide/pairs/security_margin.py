@@ -7,9 +7,7 @@ What is left open, next to curved surfaces, meshes and unions, counts as within.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
-from fractions import Fraction
 
 import numpy as np
 
@@ -17,6 +15,7 @@ from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument
 from collide.lowering.packed_convex import HALFSPACE, POINTS
 from collide.lowering.parts import convex_set_of, is_single_convex
+from collide.lowering.split_sums import split_lengths
 from collide.narrowphase.convex_batches import Question
 from collide.pairs.batches import answer_batch
 from collide.results import UNDECIDED
@@ -66,13 +65,11 @@ def _grown(A: Shape, B: Shape, margin: float) -> tuple[Shape, Shape] | None:
     stay = [S.is_region or (packed is not None and packed.kind == HALFSPACE) for S, packed in zip((A, B), sets)]
     if not points or len(points) + sum(stay) < 2:
         return None
-    total = Fraction(margin) + sum(Fraction(packed.radius) for packed in points)
-    first = float(total)
-    if first > total:
-        first = math.nextafter(first, 0.0)
-    rest = float(total - Fraction(first))
-    if total != Fraction(first) + Fraction(rest) or 0.0 < rest < SMALLEST or first > LARGEST:
+    radii = [packed.radius for packed in points] + [0.0]
+    split = split_lengths(margin, radii[0], radii[1])
+    if split is None or 0.0 < split[1] < SMALLEST or split[0] > LARGEST:
         return None
+    first, rest = split
     if len(points) == 2:
         return ConvexHull(points[0].points, radius=first), ConvexHull(points[1].points, radius=rest)
     if rest != 0.0:

@@ -106,6 +106,7 @@ _TYPES = {
         c_void_p, c_void_p, c_void_p, c_size_t, Poses, Poses, c_double, c_size_t, c_uint, c_void_p, c_size_t, c_void_p,
         POINTER(c_size_t),
     ],
+    "collide_within": [c_void_p, c_void_p, c_void_p, Poses, Poses, c_double, c_uint, c_void_p, POINTER(c_size_t)],
     "collide_cast": [
         c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_uint, c_void_p,
     ],
@@ -127,6 +128,16 @@ _TYPES = {
     "collide_compound_collide": [c_void_p, c_void_p, c_void_p, Poses, Poses, c_uint, c_void_p, POINTER(c_size_t)],
     "collide_compound_distance": [
         c_void_p, c_void_p, c_void_p, Poses, Poses, c_double, c_uint, c_void_p, POINTER(c_size_t),
+    ],
+    "collide_compound_contacts": [
+        c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_size_t, c_uint, c_void_p, c_size_t,
+        POINTER(c_size_t),
+    ],
+    "collide_mesh_shape_collide": [c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_uint, POINTER(c_int)],
+    "collide_mesh_shape_distance": [c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_uint, c_void_p],
+    "collide_mesh_contacts": [
+        c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_size_t, c_uint, c_void_p, c_size_t,
+        POINTER(c_size_t),
     ],
     "collide_mesh_create": [c_void_p, c_size_t, c_void_p, c_size_t, c_int, c_void_p],
     "collide_mesh_of_shape": [c_void_p, c_void_p],
@@ -363,6 +374,16 @@ class Asker:
         )
         return status, rows, starts.astype(np.int64), failed.value
 
+    def within(self, A: CShape, B: CShape, X_WA, X_WB, margin: float, flags: int = 0):
+        """(status, booleans, number of the pair to blame)."""
+        X_WA, X_WB, failed = _doubles(X_WA).reshape(-1, 4, 4), _doubles(X_WB).reshape(-1, 4, 4), c_size_t(0)
+        out = np.full(max(len(X_WA), len(X_WB)), 7, dtype=np.uint8)
+        poses = Poses(X_WA.ctypes.data, len(X_WA)), Poses(X_WB.ctypes.data, len(X_WB))
+        status = library().collide_within(
+            self.handle, A.handle, B.handle, *poses, margin, flags, out.ctypes.data, failed
+        )
+        return status, out, failed.value
+
     def cast(self, A: CShape, B: CShape, X_WA, X_WB, direction, limit: float = math.inf, flags: int = 0):
         """(status, row)."""
         rows, X_WA, X_WB, direction = np.full(1, 7, dtype=FIRST_CONTACT), *map(_doubles, (X_WA, X_WB, direction))
@@ -433,6 +454,24 @@ class Asker:
         function = getattr(library(), f"collide_compound_{'collide' if boolean else 'distance'}")
         status = function(self.handle, A.handle, B.handle, *poses, *rest, out.ctypes.data, failed)
         return status, out.astype(bool) if boolean else out, failed.value
+
+    def many_contacts(self, A, B, X_WA, X_WB, margin: float, max_contacts: int, *, capacity=1024, flags: int = 0):
+        """(status, rows that there is room for, how many there are) of two `CMesh` or `CCompound`."""
+        rows, count = np.full(max(capacity, 1), 7, dtype=CONTACT_DTYPE), c_size_t()
+        X_WA, X_WB = _doubles(X_WA), _doubles(X_WB)
+        name = "collide_mesh_contacts" if isinstance(A, CMesh) else "collide_compound_contacts"
+        status = getattr(library(), name)(
+            self.handle, A.handle, B.handle, X_WA.ctypes.data, X_WB.ctypes.data, margin, max_contacts, flags,
+            rows.ctypes.data, capacity, count,
+        )
+        return status, rows[: min(count.value, capacity)], count.value
+
+    def mesh_shape(self, A: CMesh, B: CShape, X_WA, X_WB, flags: int = 0):
+        """(status, whether they meet, status, row)."""
+        hit, rows, X_WA, X_WB = c_int(7), np.full(1, 7, dtype=PAIR_DTYPE), _doubles(X_WA), _doubles(X_WB)
+        asked = self.handle, A.handle, B.handle, X_WA.ctypes.data, X_WB.ctypes.data, flags
+        status = library().collide_mesh_shape_collide(*asked, hit)
+        return status, bool(hit.value), library().collide_mesh_shape_distance(*asked, rows.ctypes.data), rows
 
     def meshes_meet(self, A: CMesh, B: CMesh, X_WA, X_WB, flags: int = 0) -> tuple[int, bool]:
         hit, X_WA, X_WB = c_int(), _doubles(X_WA), _doubles(X_WB)

@@ -145,3 +145,41 @@ def test_what_python_refuses_is_refused():
         assert asker.compounds(pair, pair, np.eye(4), np.eye(4), boolean=False, limit=limit)[0] == c.INVALID_ARGUMENT
     assert asker.compounds(pair, pair, np.eye(4), np.eye(4), boolean=True, flags=4)[0] == c.INVALID_ARGUMENT
     assert asker.compounds(pair, pair, [np.eye(4)] * 2, [np.eye(4)] * 3, boolean=True)[0] == c.INVALID_ARGUMENT
+
+
+def test_contacts_have_pythons_bits_or_are_left_to_python():
+    asker, told = c.Asker(), {"contacts": 0, "none": 0, "left": 0}
+    for number, ((name, A, B, X_WA, X_WB), pair) in enumerate(zip(drawn(), made())):
+        random = np.random.default_rng([113, number])
+        margin = float(np.linalg.norm(X_WB[:3, 3] - X_WA[:3, 3])) * float(random.choice([0.0, 1e-2, 0.3]))
+        most = int(random.choice([1, 4, 8]))
+        try:
+            wanted = collide.contacts(A, B, X_WA, X_WB, margin=margin, max_contacts=most).rows
+        except collide.UnsupportedQuery:
+            wanted = None
+        status, rows, count = asker.many_contacts(*pair, X_WA, X_WB, margin, most)
+        if status == c.OK:
+            assert count == len(rows) and rows.tobytes() == wanted.tobytes(), (name, margin, most, rows, wanted)
+            told["contacts" if count else "none"] += 1
+        else:
+            assert (status, count) == (c.UNSUPPORTED, 0), (name, status)
+            told["left"] += 1
+    assert told["contacts"] >= 50 and told["none"] >= 60 and told["left"] <= 20, told
+
+
+def test_contacts_of_a_union_at_rest_and_room_for_them():
+    """A table of a board and four legs on a floor of two slabs."""
+    legs = [(collide.Box(0.1, 0.1, 0.8), c.identity_at(x, y, 0.4)) for x in (-0.4, 0.4) for y in (-0.4, 0.4)]
+    table = collide.Compound([(collide.Box(1, 1, 0.1), c.identity_at(0, 0, 0.85)), *legs])
+    floor = collide.Compound([(collide.Box(2, 4, 0.2), c.identity_at(x, 0, -0.1)) for x in (-1, 1)])
+    asker, pair, X = c.Asker(), (c.CCompound(table), c.CCompound(floor)), c.identity_at(0.05, 0.02, -1e-3)
+    wanted = collide.contacts(table, floor, X, np.eye(4), margin=1e-3, max_contacts=4).rows
+    status, rows, count = asker.many_contacts(*pair, X, np.eye(4), 1e-3, 4)
+    assert (status, rows.tobytes()) == (c.OK, wanted.tobytes()) and count == 16, (status, count)
+    status, some, count = asker.many_contacts(*pair, X, np.eye(4), 1e-3, 4, capacity=5)
+    assert (status, count) == (c.TOO_MANY, 16) and some.tobytes() == rows[:5].tobytes()
+    for margin in (-1.0, math.nan, math.inf, 1e51):
+        assert asker.many_contacts(*pair, X, np.eye(4), margin, 4)[0] == c.INVALID_ARGUMENT
+    assert asker.many_contacts(*pair, X, np.eye(4), 0.0, 0)[0] == c.INVALID_ARGUMENT
+    for number, bad in enumerate(c.odd_poses()):
+        assert asker.many_contacts(*pair, X, bad, 0.0, 4)[0] == c.INVALID_POSE, number
