@@ -144,7 +144,7 @@ collide_status collide_capsule(double radius, double length, collide_shape **sha
     if (shape == NULL) return COLLIDE_INVALID_ARGUMENT;
     *shape = NULL;
     if (!is_length(radius) || !(length == 0.0 || is_length(length))) return COLLIDE_INVALID_SHAPE;
-    ends[2] = -(0.5 * length);
+    ends[2] = 0.0 - 0.5 * length; /* no minus zero of a ball */
     ends[5] = 0.5 * length;
     return shape_of_points(ends, length > 0.0 ? 2 : 1, radius, 0.0, 0, shape);
 }

@@ -24,6 +24,7 @@ import pytest
 import soak_pairs
 
 import collide
+from collide.casts.ray_hits import WORLD_HIT_DTYPE
 from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.kernels import mode
 from collide.kernels.library import library_path
@@ -85,15 +86,20 @@ def test_header_is_c99_and_cpp(tmp_path):
         run(tool, f"-std={standard}", *STRICT, "-fsyntax-only", f"-I{header_folder()}", tmp_path / name)
 
 
+_ROWS = (
+    ("collide_pair", PAIR_DTYPE), ("collide_contact", CONTACT_DTYPE), ("collide_world_hit", WORLD_HIT_DTYPE),
+)
+
+
 def test_rows_are_those_of_python(tmp_path):
     fields = ""
-    for struct, dtype in (("collide_pair", PAIR_DTYPE), ("collide_contact", CONTACT_DTYPE)):
+    for struct, dtype in _ROWS:
         for name in dtype.names:
             fields += f'    printf("{struct}.{name} %zu\\n", offsetof({struct}, {name}));\n'
         fields += f'    printf("{struct} %zu\\n", sizeof({struct}));\n'
     text = f'#include "collide.h"\n#include <stdio.h>\nint main(void) {{\n{fields}    return 0;\n}}\n'
     told = dict(line.split() for line in run(built(tmp_path, text)).splitlines())
-    for struct, dtype in (("collide_pair", PAIR_DTYPE), ("collide_contact", CONTACT_DTYPE)):
+    for struct, dtype in _ROWS:
         assert told.pop(struct) == str(dtype.itemsize)
         for name in dtype.names:
             assert told.pop(f"{struct}.{name}") == str(dtype.fields[name][1])
@@ -306,6 +312,19 @@ def test_single_calls_have_pythons_bits():
     assert exact >= 300, f"only {exact} of {len(rows)} pairs needed the exact stage"
     hits = int(rows["hit"].sum())
     assert 0.2 < hits / len(rows) < 0.8, f"{hits} of {len(rows)} hit"
+
+
+def test_a_capsule_without_length_has_pythons_zeros():
+    """At a pose with minus zeros, which shows the sign of a zero of its end."""
+    A, B = collide.Capsule(1.25, 0.0), collide.Capsule(0.0045, 0.009)
+    X_WA, minus_zeros = np.array([[0.0, 1, 0, 0], [-0.0, -0.0, -1, -0.0], [-1, -0.0, -0.0, -0.0], [0, 0, 0, 1]]), 0
+    for z in np.linspace(-0.002, 0.001, 13):
+        X_WB = c.identity_at(-0.0118, 0.0183, z)
+        wanted = collide.distance(A, B, X_WA, X_WB).rows
+        status, found = c.Asker().distance(c.CShape(A), c.CShape(B), X_WA, X_WB)
+        assert status == c.OK and found.tobytes() == wanted.tobytes(), (z, found, wanted)
+        minus_zeros += int((np.signbit(wanted["point_a"]) & (wanted["point_a"] == 0.0)).sum())
+    assert minus_zeros >= 5
 
 
 def test_four_threads_at_once_have_pythons_bits():
