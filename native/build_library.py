@@ -38,6 +38,7 @@ C_SOURCES = [
     "capi_casts.c", "capi_impact.c", "capi_rays.c", "capi_within.c", "capi_compound.c", "capi_compound_pairs.c",
     "capi_mesh_contacts.c", "capi_mesh_shapes.c", "capi_compound_contacts.c",
     "capi_field.c", "capi_field_cells.c", "capi_field_items.c", "capi_field_pairs.c",
+    "capi_world.c", "capi_world_shapes.c", "capi_world_tree.c", "capi_world_pairs.c", "capi_world_outside.c",
     "host_mujoco.c", "host_slots.c", "host_terrain.c",
     "host_terrain_bodies.c", "host_terrain_deep.c", "host_terrain_facets.c", "host_terrain_near.c",
     "host_terrain_prisms.c", "host_terrain_rows.c",

@@ -65,23 +65,31 @@ static collide_status one_pair(collide_workspace *space, const struct contact_qu
     return status;
 }
 
+collide_status contacts_of_shapes(collide_workspace *space, const collide_shape *A, const collide_shape *B, const double *X_WA,
+                                  const double *X_WB, double margin, size_t max_contacts, unsigned flags,
+                                  collide_contact *rows, size_t capacity, size_t *count)
+{
+    struct contact_question asked;
+    collide_status status;
+    asked.margin = margin;
+    asked.max_contacts = max_contacts;
+    asked.capacity = capacity;
+    asked.flags = flags;
+    asked.contacts = rows;
+    if (!are_good(space, &asked)) return COLLIDE_INVALID_ARGUMENT;
+    if (manifold_of(space) == NULL) return COLLIDE_NO_MEMORY;
+    if ((status = take_shapes(space, space->manifold, A, B)) != COLLIDE_OK) return status;
+    return one_pair(space, &asked, X_WA, X_WB, 0, count);
+}
+
 collide_status collide_contacts(collide_workspace *workspace, const collide_shape *A, const collide_shape *B, const double X_WA[16],
                                 const double X_WB[16], double margin, size_t max_contacts, unsigned flags,
                                 collide_contact *contacts, size_t *count)
 {
-    struct contact_question asked;
-    collide_status status;
     if (count == NULL) return COLLIDE_INVALID_ARGUMENT;
     *count = 0;
-    asked.margin = margin;
-    asked.max_contacts = asked.capacity = max_contacts;
-    asked.flags = flags;
-    asked.contacts = contacts;
-    if (!are_good(workspace, &asked) || A == NULL || B == NULL || X_WA == NULL || X_WB == NULL || contacts == NULL)
-        return COLLIDE_INVALID_ARGUMENT;
-    if (manifold_of(workspace) == NULL) return COLLIDE_NO_MEMORY;
-    if ((status = take_shapes(workspace, workspace->manifold, A, B)) != COLLIDE_OK) return status;
-    return one_pair(workspace, &asked, X_WA, X_WB, 0, count);
+    if (A == NULL || B == NULL || X_WA == NULL || X_WB == NULL || contacts == NULL) return COLLIDE_INVALID_ARGUMENT;
+    return contacts_of_shapes(workspace, A, B, X_WA, X_WB, margin, max_contacts, flags, contacts, max_contacts, count);
 }
 
 /* shapes, which : of a set; or A and B in `shapes`, and NULL. */

@@ -36,6 +36,11 @@ void take_table_pair(collide_workspace *space, struct manifold_space *manifold, 
 collide_status contacts_of_pair(collide_workspace *space, struct manifold_space *manifold, const double *X_WA, const double *X_WB,
                                 double margin, int64_t max_contacts, unsigned flags, collide_contact *rows, int64_t *n);
 
+/* capi_contact_queries.c: contacts of two shapes; COLLIDE_TOO_MANY where `capacity` may not do. */
+collide_status contacts_of_shapes(collide_workspace *space, const collide_shape *A, const collide_shape *B, const double *X_WA,
+                                  const double *X_WB, double margin, size_t max_contacts, unsigned flags,
+                                  collide_contact *rows, size_t capacity, size_t *count);
+
 /* Whether the pair taken is proven to be farther apart than `gap`, and the direction that parts them. */
 int is_farther_apart(collide_workspace *space, const double *X_WA, const double *X_WB, double gap, double direction[3]);
 

@@ -87,6 +87,7 @@ struct compound_space;
 struct mesh_contact_space;
 struct compound_contact_space;
 struct collide_mesh;
+struct world_space;
 
 struct collide_shape {
     int64_t ints[INTS];
@@ -141,6 +142,8 @@ struct collide_workspace {
     struct mesh_contact_space *mesh_contacts; /* NULL until some are asked for */
     struct compound_contact_space *compound_contacts; /* the same of unions */
     struct collide_mesh *middle; /* a point at the origin, as a body of facets; NULL until it is asked for */
+    struct world_space *world;       /* of worlds; NULL until one is asked */
+    char message[240];               /* of the last question about a world */
     void *held[3];
 };
 
@@ -173,6 +176,12 @@ struct question {
     double limit;
     double *axes;
 };
+
+/* capi_pairs.c: answers of pairs of rows of a table, whose poses were checked: into zeroed booleans or rows. */
+collide_status answer_table(collide_workspace *space, const int64_t *ints, const double *numbers, const struct question *asked,
+                            uint8_t *hits, collide_pair *pairs, size_t *failed);
+/* capi_world_pairs.c */
+void free_world_space(struct world_space *own);
 
 /* --- how the processor rounds -------------------------------------------------------------------------------------- */
 

@@ -106,6 +106,7 @@ void collide_workspace_free(collide_workspace *workspace)
     collide_mesh_free(workspace->middle);
     free_compound_space(workspace->compound);
     free_compound_contacts(workspace->compound_contacts);
+    free_world_space(workspace->world);
     free(workspace->held[0]);
     free(workspace->held[1]);
     free(workspace->held[2]);
@@ -187,6 +188,14 @@ static collide_status answer(collide_workspace *space, const struct question *as
         }
     }
     return COLLIDE_OK;
+}
+
+collide_status answer_table(collide_workspace *space, const int64_t *ints, const double *numbers, const struct question *asked,
+                            uint8_t *hits, collide_pair *pairs, size_t *failed)
+{
+    space->header[INTS_AT] = address_of(ints);
+    space->header[NUMBERS_AT] = address_of(numbers);
+    return answer(space, asked, hits, pairs, failed);
 }
 
 /* Body numbers into rows, and out with depths that nobody asked for; a depth without end is told. */

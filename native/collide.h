@@ -526,6 +526,135 @@ COLLIDE_API collide_status collide_point_cloud_nearest(const collide_field *clou
 COLLIDE_API collide_status collide_point_cloud_within(const collide_field *cloud, const double place[3], double r, int64_t *rows,
                                                       size_t capacity, size_t *count);
 
+/* --- worlds ----------------------------------------------------------------------------------------------------------
+
+   Many bodies, a tree over their boxes, and questions about all of them: the answers of Python's World, row by row and bit by bit.
+   Bodies are convex shapes. A change takes its time in the call that makes it: a step moves bodies, and the tree follows.
+   Questions change nothing: any number of threads may ask a world at once, each with its own workspace, while nobody changes it.
+   Shapes are not copied: free a shape once no body has it any more.
+
+   A pair of bodies is tested unless both are static or asleep, their groups and masks exclude each other (tested when
+   (group_A & mask_B) and (group_B & mask_A)), or `collide_world_allow` names the pair.
+
+   Room is the caller's: where rows are more than `capacity`, as many are written, *count becomes how many there are, and
+   COLLIDE_TOO_MANY is returned. A capacity of 0 with rows NULL asks how many. A workspace keeps lists that grow with what is asked;
+   they are all that a question allocates.
+
+   Where a change does not return COLLIDE_OK the world is as before, and `collide_world_message` says which argument, or which
+   body, is to blame; of questions `collide_workspace_message` does. */
+typedef struct collide_world collide_world;
+
+COLLIDE_API collide_status collide_world_create(collide_world **world);
+
+/* Frees a world, not its shapes; NULL is fine. */
+COLLIDE_API void collide_world_free(collide_world *world);
+
+/* A sentence about the last change of a world that did not return COLLIDE_OK, or about the last such question asked with a
+   workspace, until the next one; "" where there was none. Never NULL. */
+COLLIDE_API const char *collide_world_message(const collide_world *world);
+COLLIDE_API const char *collide_workspace_message(const collide_workspace *workspace);
+
+/* A body as it is added. Begin with COLLIDE_BODY_DEFAULT: later versions may have more fields, behind these. */
+typedef struct collide_body {
+    size_t size;                /* sizeof(collide_body) */
+    const collide_shape *shape;
+    const double *X_WB;         /* its pose in the world, 16 doubles; NULL: the identity */
+    int is_static;              /* never tested against other static bodies */
+    uint32_t group, mask;       /* bit sets: the groups of the body, and the groups to test it against */
+} collide_body;
+
+#define COLLIDE_BODY_DEFAULT {sizeof(collide_body), NULL, NULL, 0, 1u, 0xFFFFu}
+
+/* Add n bodies; ids[k] becomes the id of bodies[k], ascending, never used again in this world. O(log n) a body, or less of many
+   at once. Where one of them is bad none is added. */
+COLLIDE_API collide_status collide_world_add(collide_world *world, const collide_body *bodies, size_t n, int32_t *ids);
+
+/* Take a body out, and what was allowed for it. */
+COLLIDE_API collide_status collide_world_remove(collide_world *world, int32_t id);
+
+/* Give n bodies other poses, 16 doubles each, in the order of ids; of a body named twice the last one counts. Where one is bad
+   none has moved. Many in one call take less than one by one. */
+COLLIDE_API collide_status collide_world_move(collide_world *world, const int32_t *ids, size_t n, const double *X_WBs);
+
+/* Give a body another shape; its id, pose, filters and sleep stay. */
+COLLIDE_API collide_status collide_world_replace(collide_world *world, int32_t id, const collide_shape *shape);
+
+/* Put bodies to sleep (asleep 1) or wake them (0): a pair of two bodies asleep or static is not tested. */
+COLLIDE_API collide_status collide_world_sleep(collide_world *world, const int32_t *ids, size_t n, int asleep);
+
+/* Never test n pairs of bodies, two ids each. O(pairs allowed so far) a call: hand over many at once. */
+COLLIDE_API collide_status collide_world_allow(collide_world *world, const int32_t *pairs, size_t n);
+
+/* How many bodies there are. */
+COLLIDE_API size_t collide_world_size(const collide_world *world);
+
+/* The pose of a body, as it was handed in. */
+COLLIDE_API collide_status collide_world_pose(const collide_world *world, int32_t id, double X_WB[16]);
+
+/* Whether any tested pair hits; stops at the first hit. */
+COLLIDE_API collide_status collide_world_collides(const collide_world *world, collide_workspace *workspace, int *hit);
+
+/* Every tested pair that hits, with its depth: rows sorted by (a, b), the ids of the bodies, a < b. Of two half-spaces that
+   overlap the distance is minus infinity. */
+COLLIDE_API collide_status collide_world_collisions(const collide_world *world, collide_workspace *workspace, collide_pair *rows,
+                                                    size_t capacity, size_t *count);
+
+/* Every tested pair at most max_distance >= 0 apart, or infinite for all pairs, hits included. Only pairs proven to be farther
+   apart are left out: lower <= max_distance of all rows. */
+COLLIDE_API collide_status collide_world_distances(const collide_world *world, collide_workspace *workspace, double max_distance,
+                                                   collide_pair *rows, size_t capacity, size_t *count);
+
+/* The tested pair of least signed distance, of several the one with the least ids: *count becomes 1, or 0 where no tested pair
+   is within max_distance. By branch and bound: pairs whose boxes cannot be as near are not asked. */
+COLLIDE_API collide_status collide_world_minimum(const collide_world *world, collide_workspace *workspace, double max_distance,
+                                                 collide_pair *row, size_t *count);
+
+/* Contacts of every tested pair within a margin >= 0 [m], at most max_contacts >= 1 a pair, sorted by (a, b), the ids of the
+   bodies; as `collide_contacts`. */
+COLLIDE_API collide_status collide_world_contacts(const collide_world *world, collide_workspace *workspace, double margin,
+                                                  size_t max_contacts, collide_contact *contacts, size_t capacity, size_t *count);
+
+/* A shape from outside against every body: rows of those at most max_distance apart, a -1 and b the id of the body, sorted by
+   b. Filters and sleep do not apply. */
+COLLIDE_API collide_status collide_world_query(const collide_world *world, collide_workspace *workspace, const collide_shape *shape,
+                                               const double X_WS[16], double max_distance, collide_pair *rows, size_t capacity,
+                                               size_t *count);
+
+/* Ids of bodies, ascending, whose axis-aligned boxes come within a margin of the box low_W ... high_W, which may be infinite: the
+   broadphase alone. Boxes of half-spaces are near everything. */
+COLLIDE_API collide_status collide_world_boxes_near(const collide_world *world, collide_workspace *workspace, const double low_W[3],
+                                                    const double high_W[3], double margin, int32_t *ids, size_t capacity,
+                                                    size_t *count);
+
+/* What a ray meets first, or which body is nearest to a point: a row of Python's WorldHits, byte by byte. */
+typedef struct collide_world_hit {
+    double distance;     /* t on a ray, in lengths of its direction; of points the signed distance [m]; infinite of nothing */
+    double lower, upper; /* lower <= truth <= upper, proven where certified */
+    double normal[3];    /* unit vector in W: outward from the body for rays, from the point to the body; or zeros */
+    double point[3];     /* in W [m], of the body; zeros where nothing is met */
+    int32_t ray;         /* number of the ray or point */
+    int32_t body;        /* id of the body, -1 where nothing is met */
+    int32_t item;        /* 0; -1 where nothing is met */
+    int32_t facet;       /* of a ray on a cylinder or cone: 0 round about, 1 below, 2 above; as of Python's raycast */
+    uint8_t hit;         /* 1 where anything is met */
+    uint8_t certified;   /* 1 where hit or miss is proven, and the bracket narrow */
+    uint8_t at_start;    /* 0 */
+} collide_world_hit;
+
+/* The first body on each of n rays, x y z of origins and directions, which need be no unit vectors. max_distance : in lengths
+   of the direction. group, mask : NULL, or bit sets: bodies count with (*group & mask_B) and (group_B & *mask). statuses :
+   NULL, or room for n. A ray that touches a surface within rounding, or begins on one, Python settles in integers: its status
+   is COLLIDE_UNSUPPORTED, its row zeros, and so is the call's; all others are answered. */
+COLLIDE_API collide_status collide_world_raycast(const collide_world *world, collide_workspace *workspace, const double *origins_W,
+                                                 const double *directions_W, size_t n, double max_distance, const uint32_t *group,
+                                                 const uint32_t *mask, collide_world_hit *hits, collide_status *statuses);
+
+/* The body of least signed distance to each of n points, x y z of each, no farther than max_distance; of several the one with
+   the least id. group, mask : as of `collide_world_raycast`; with them every body's box is looked at. */
+COLLIDE_API collide_status collide_world_nearest(const collide_world *world, collide_workspace *workspace, const double *points_W,
+                                                 size_t n, double max_distance, const uint32_t *group, const uint32_t *mask,
+                                                 collide_world_hit *hits);
+
 #ifdef __cplusplus
 }
 #endif

@@ -155,8 +155,37 @@ _TYPES = {
     ],
     "collide_point_cloud_nearest": [c_void_p, c_void_p, c_size_t, c_size_t, c_double, c_void_p, c_void_p],
     "collide_point_cloud_within": [c_void_p, c_void_p, c_double, c_void_p, c_size_t, POINTER(c_size_t)],
+    "collide_world_create": [c_void_p],
+    "collide_world_free": [c_void_p],
+    "collide_world_message": [c_void_p],
+    "collide_workspace_message": [c_void_p],
+    "collide_world_add": [c_void_p, c_void_p, c_size_t, c_void_p],
+    "collide_world_remove": [c_void_p, c_int],
+    "collide_world_move": [c_void_p, c_void_p, c_size_t, c_void_p],
+    "collide_world_replace": [c_void_p, c_int, c_void_p],
+    "collide_world_sleep": [c_void_p, c_void_p, c_size_t, c_int],
+    "collide_world_allow": [c_void_p, c_void_p, c_size_t],
+    "collide_world_size": [c_void_p],
+    "collide_world_pose": [c_void_p, c_int, c_void_p],
+    "collide_world_collides": [c_void_p, c_void_p, POINTER(c_int)],
+    "collide_world_collisions": [c_void_p, c_void_p, c_void_p, c_size_t, POINTER(c_size_t)],
+    "collide_world_distances": [c_void_p, c_void_p, c_double, c_void_p, c_size_t, POINTER(c_size_t)],
+    "collide_world_minimum": [c_void_p, c_void_p, c_double, c_void_p, POINTER(c_size_t)],
+    "collide_world_contacts": [c_void_p, c_void_p, c_double, c_size_t, c_void_p, c_size_t, POINTER(c_size_t)],
+    "collide_world_query": [c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_void_p, c_size_t, POINTER(c_size_t)],
+    "collide_world_boxes_near": [
+        c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_void_p, c_size_t, POINTER(c_size_t),
+    ],
+    "collide_world_raycast": [
+        c_void_p, c_void_p, c_void_p, c_void_p, c_size_t, c_double, c_void_p, c_void_p, c_void_p, c_void_p,
+    ],
+    "collide_world_nearest": [
+        c_void_p, c_void_p, c_void_p, c_size_t, c_double, c_void_p, c_void_p, c_void_p,
+    ],
 }
-_TEXTS = {"collide_status_text", "collide_version"}
+_TEXTS = {"collide_status_text", "collide_version", "collide_world_message", "collide_workspace_message"}
+#: What is no status.
+_OTHERS = {**dict.fromkeys(_TEXTS, c_char_p), "collide_world_size": c_size_t}
 
 
 @cache
@@ -166,7 +195,7 @@ def library() -> ctypes.CDLL:
     for name, types in _TYPES.items():
         function = getattr(found, name)
         function.argtypes = types
-        function.restype = c_char_p if name in _TEXTS else None if name.endswith("_free") else c_int
+        function.restype = _OTHERS.get(name, None if name.endswith("_free") else c_int)
     return found
 
 

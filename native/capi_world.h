@@ -1,0 +1,128 @@
+/* Worlds: bodies in columns, the tree over their boxes, and what questions about them take. Python's are in collide/worlds and
+   collide/broadphase. */
+#ifndef COLLIDE_CAPI_WORLD_H
+#define COLLIDE_CAPI_WORLD_H
+
+#include "capi_contacts.h"
+
+/* --- layouts; `begin_world` compares their sizes with what the kernels say (collide/casts/world_constants.py) ------------ */
+
+/* A node of the tree (collide/broadphase/graded_boxes.py), and a body's integers and bits (tree_in_memory.py). */
+enum { SKIP, BODY, PARENT, LINK };
+enum { FLAGS, GROUP, MASK, ALLOWED_AT, TRAITS };
+enum { STATIC_BIT = 1, STILL_BIT = 2 };
+/* A tree in memory, bodies of single parts (moved_bodies.py), and a tree as rays see it (collide/casts/rays_in_tree.py). */
+enum {
+    T_NODES_AT, T_LINKS_AT, T_N_NODES, T_N_FIXED, T_BOXES_AT, T_N_BOXES, T_TRAITS_AT, T_ALLOWED_AT, T_N_ALLOWED, T_LEAF_OF_AT,
+    T_CHANGED_AT, T_N_CHANGED, TREE_HEADER
+};
+enum { P_INTS_AT, P_NUMBERS_AT, P_ROW_OF_AT, P_POSES_AT, P_BOXES_AT, P_N_BODIES, P_N_MOVED, SINGLE_PARTS };
+enum {
+    R_NODES_AT, R_LINKS_AT, R_N_NODES, R_FIRST_AT, R_N_BODIES, R_SKIPPED_AT, R_MESHED_AT, R_UNBOUNDED_AT, R_N_UNBOUNDED,
+    RAY_TREE
+};
+/* Doubles of a question of `boxes_ahead`, and of a ray; integers that a row of allowed pairs takes for each of them at most. */
+enum { SWEEP = 10, RAY = 6, ROW_OF_A_KEY = 8 };
+/* What `write_world_constants` writes. */
+enum {
+    W_TREE, W_LINK, W_TRAITS, W_SINGLE_PARTS, W_ROW_OF_A_KEY, W_SWEEP, W_STACK, W_STACK_OF_PAIRS, W_RAY, W_RAY_TREE, W_RAY_DOUBLES,
+    W_RAY_INTEGERS, W_HIT_ROW, WORLD_MEASURES
+};
+
+/* Trees one behind another: each has more than twice the nodes of the next. */
+enum { MAX_SECTIONS = 64 };
+enum { MESSAGE = 240 };
+
+/* --- a world -------------------------------------------------------------------------------------------------------- */
+
+/* Distinct shapes, in rows that kernels read; row 0 is a point. */
+struct shape_rows {
+    int64_t *ints;
+    double *numbers;
+    const collide_shape **shapes; /* NULL of rows that are free */
+    size_t *users;                /* how many bodies have it */
+    size_t *order;                /* rows in use, by content and then by address */
+    size_t *unused;               /* rows that are free */
+    size_t n, n_ordered, n_unused;
+};
+
+/* The forest over bodies that have an end: fixed ones first (collide/broadphase/tree_over_bodies.py). */
+struct body_tree {
+    double *nodes;
+    int64_t *links, *scratch;
+    int64_t sections[MAX_SECTIONS + 1], n_inner[MAX_SECTIONS], n_fixed;
+    double sides[MAX_SECTIONS], least; /* sums of sides of inner nodes, and the least sum since the trees were made [m] */
+    size_t n_sections, n_holes;
+};
+
+struct collide_world {
+    const struct collide_kernels *kernels;
+    int64_t measures[WORLD_MEASURES];
+    /* Columns, a row a body in the order of ids; those of removed bodies stay until they are many. */
+    int32_t *ids;
+    double *X_WBs, *poses, *boxes;
+    int64_t *row_of, *traits, *leaf_of, *changed, *first, *meshed, *unbounded, *numbers;
+    uint8_t *is_moved, *is_alive;
+    size_t n, n_alive, capacity, n_unbounded;
+    int64_t n_changed;
+    int32_t next_id;
+    struct shape_rows table;
+    struct body_tree tree;
+    /* Pairs never tested: keys both ways round, ascending, and rows of them as kernels read them. */
+    int64_t *allowed_keys, *allowed_rows;
+    size_t n_allowed_keys, n_allowed, allowed_capacity;
+    collide_shape *point;
+    char message[MESSAGE];
+};
+
+/* What questions about worlds take beside a workspace: lists that grow, and a block of pairs. */
+struct world_space {
+    int64_t *keys, *sorted, *pairs, *counts, *stack, *skipped;
+    double *bounds, *rays, *flat_nodes;
+    int64_t *flat_links; /* of a tree of leaves side by side */
+    collide_contact *contacts;
+    size_t n_keys, n_counts, n_contacts, n_flat;
+    double X_WA[16 * BLOCK], X_WB[16 * BLOCK];
+    int64_t which[2 * BLOCK];
+    collide_pair rows[BLOCK];
+    uint8_t hits[BLOCK];
+};
+
+/* Write a sentence, and return the status. */
+collide_status refuse(char *message, collide_status status, const char *format, ...);
+
+static inline int64_t key_of(int64_t i, int64_t j) { return i < j ? i << 32 | j : j << 32 | i; }
+static inline int64_t first_of(int64_t key) { return key >> 32; }
+static inline int64_t second_of(int64_t key) { return key & 0xffffffff; }
+
+/* capi_world_shapes.c: rows of shapes for one more user, with room for it; and one user less. */
+int64_t take_shape(struct shape_rows *table, const collide_shape *shape);
+void leave_shape(struct shape_rows *table, int64_t row);
+static inline const collide_shape *shape_of_body(const collide_world *world, int64_t body)
+{
+    return world->table.shapes[world->row_of[body]];
+}
+
+/* capi_world_tree.c: the tree as kernels take it; what changes of bodies do to it, whose memory is there. */
+void tree_header(const collide_world *world, int64_t header[TREE_HEADER]);
+void make_trees(collide_world *world);
+void add_to_trees(collide_world *world, size_t first);
+void take_from_trees(collide_world *world, int64_t body);
+/* Poses and boxes of the bodies whose flags are set; with_tree: of bodies that are in it. */
+void move_flagged(collide_world *world, int with_tree);
+/* The mean side of an inner node [m]: how far apart bodies are. */
+double spacing_of(const struct body_tree *tree);
+
+/* capi_world_pairs.c: what every question begins with: arguments that are good, and memory. */
+collide_status check_question(const collide_world *world, collide_workspace *space, const char *caller, int is_good,
+                              const char *what);
+collide_status no_memory(collide_workspace *space);
+/* Room for so many keys; 0 where there is none. */
+int fit_keys(struct world_space *own, size_t n);
+/* Sort keys of bodies below n, of which there are counts. */
+void sort_keys(struct world_space *own, size_t n_keys, size_t n);
+/* Answer up to BLOCK keys of bodies, or of a point and bodies where X_WP is not NULL, into own->hits or own->rows. */
+collide_status answer_keys(const collide_world *world, collide_workspace *space, const int64_t *keys, size_t n, const double *X_WP,
+                           int boolean, double limit);
+
+#endif

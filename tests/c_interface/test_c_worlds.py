@@ -1,0 +1,425 @@
+"""Worlds through the C interface: after any changes they answer as Python's do, bit by bit, in one thread and in four.
+
+Whether Python's are right is judged in `tests/worlds` and `tests/soak`.
+"""
+
+from __future__ import annotations
+
+import collections
+import ctypes
+import math
+from concurrent.futures import ThreadPoolExecutor
+
+import c_library as c
+import numpy as np
+import pytest
+import soak_pairs
+from c_world import CBody, CWorld
+
+import collide
+from collide.casts.ray_hits import WORLD_HIT_DTYPE
+from collide.kernels import mode
+from collide.results import PAIR_DTYPE
+
+if mode.MODE != mode.COMPILED:
+    pytest.skip(f"kernels are not those of the library: {mode.WHY}", allow_module_level=True)
+
+CONVEX = (
+    "sphere", "box", "capsule", "hull", "swept hull", "flat hull", "h-polytope", "half-space", "cylinder", "cone",
+    "ellipsoid",
+)
+
+
+class Both:
+    """A World of Python and one of C under the same random changes, asked the same questions.
+
+    wrong : what was answered differently.   n : questions by sort.   hits, rows : pairs that hit, and pairs told of.
+    """
+
+    def __init__(self, seed: int, tally: collections.Counter):
+        self.random, self.seed, self.step = np.random.default_rng([91, seed]), seed, 0
+        self.python, self.own = collide.World(), CWorld()
+        self.ids: list[int] = []
+        self.made: dict[int, tuple[collide.Shape, c.CShape]] = {}  # holds what is numbered
+        self.wrong: list[str] = []
+        self.tally = tally
+
+    # --- changes --------------------------------------------------------------------------------
+
+    def in_c(self, shape: collide.Shape) -> c.CShape:
+        """The same object of the same shape, so that bodies share it."""
+        if id(shape) not in self.made:
+            self.made[id(shape)] = shape, c.CShape(shape)
+        return self.made[id(shape)][1]
+
+    def drawn(self, number: int) -> soak_pairs.Case:
+        return soak_pairs.draw(92 + self.seed, number, 1e4, CONVEX)
+
+    def add_pair(self) -> None:
+        """Two bodies, mostly close to touching, or boxes that touch, or miss by the smallest step that a double has."""
+        case = self.drawn(int(self.random.integers(1 << 30)))
+        pair = (case.A, case.X_WA), (case.B, case.X_WB)
+        if self.random.uniform() < 0.4:
+            size = self.random.integers(1, 9, 3) * 2.0 ** self.random.integers(-3, 3)
+            where = self.random.integers(-1, 2, 3) * 0.5 * (size + size[::-1])
+            where[0] = 0.5 * (size[0] + size[2])
+            where[0] = self.random.choice([where[0], np.nextafter(where[0], 9e9), np.nextafter(where[0], 0.0)])
+            pair = (collide.Box(size), np.eye(4)), (collide.Box(size[::-1]), c.identity_at(*where))
+        for shape, X in pair:
+            self.add(shape, X)
+
+    def add(self, shape: collide.Shape, X) -> None:
+        static, (group, mask) = bool(self.random.uniform() < 0.1), self.random.integers(1, 8, 2).tolist()
+        if self.random.uniform() < 0.6:
+            group, mask = 7, 0xFFFF
+        self.ids.append(self.python.add(shape, X, static=static, group=group, mask=mask))
+        assert self.own.add(self.in_c(shape), X, static, group, mask) == (c.OK, self.ids[-1])
+
+    def some(self, n: int) -> list[int]:
+        return self.random.choice(self.ids, min(n, len(self.ids)), replace=False).tolist()
+
+    def change(self) -> None:
+        """One of all changes that there are."""
+        what = str(self.random.choice(["add", "remove", "far", "near", "near", "replace", "allow", "sleep"]))
+        self.tally[what] += 1
+        if what == "add" or len(self.ids) < 6:
+            self.add_pair()
+        elif what == "remove":
+            (body,) = self.some(1)
+            self.ids.remove(body)
+            self.python.remove(body)
+            assert self.own.remove(body) == c.OK
+        elif what == "replace":
+            (body,) = self.some(1)
+            shape = self.drawn(int(self.random.integers(1 << 30))).A
+            if self.random.uniform() < 0.5:  # one that another body has
+                shape = self.python.body(self.some(1)[0]).shape
+            self.python.replace(body, shape)
+            assert self.own.replace(body, self.in_c(shape)) == c.OK
+        elif what == "allow":
+            pair = self.some(2)
+            self.python.allow(*pair)
+            assert self.own.allow([pair]) == c.OK
+        elif what == "sleep":
+            asleep, bodies = bool(self.random.uniform() < 0.6), self.some(3)
+            (self.python.sleep if asleep else self.python.wake)(bodies)
+            assert self.own.sleep(bodies, asleep) == c.OK
+        else:
+            self.move(what)
+
+    def move(self, how: str) -> None:
+        """Some bodies: to a pose of another pair, or by a step of 1e-16 … 1."""
+        bodies = self.some(int(self.random.integers(1, 5)))
+        X_WBs = np.stack([self.python.body(body).X_WB for body in bodies])
+        if how == "far":
+            X_WBs = np.stack([self.drawn(int(self.random.integers(1 << 30))).X_WB for _ in bodies])
+        X_WBs[:, :3, 3] += self.random.normal(size=(len(bodies), 3)) * 10.0 ** self.random.uniform(-16, 0)
+        self.python.set_poses(bodies, X_WBs)
+        assert self.own.move(bodies, X_WBs) == c.OK
+
+    # --- questions ------------------------------------------------------------------------------
+
+    def compare(self, what: str, wanted: np.ndarray, status: int, rows: np.ndarray) -> None:
+        self.tally[what] += 1
+        if status != c.OK or not are_equal(wanted, rows):
+            self.wrong.append(
+                f"seed {self.seed}, step {self.step}, {what}: status {status}, {self.own.question_message!r}, "
+                f"C {rows}, Python {wanted}"
+            )
+
+    def ask(self) -> None:
+        limit = float(self.random.choice([0.0, 1e-3, 1.0, math.inf]))
+        rows = self.python.distances(limit).rows
+        self.tally["rows"] += len(rows)
+        self.tally["hit rows"] += int(rows["hit"].sum())
+        self.tally["near touching"] += int((np.abs(rows["distance"]) < 1e-6).sum())
+        self.tally["exact"] += int((rows["exact"] > 0).sum())
+        self.compare("distances", rows, *self.own.distances(limit))
+        self.compare("collisions", self.python.collisions().rows, *self.own.collisions())
+        self.compare("minimum", self.python.minimum(limit).rows, *self.own.minimum(limit))
+        status, hit = self.own.collides()
+        self.compare("collides", np.array([self.python.collides()]), status, np.array([hit]))
+        self.ask_contacts(float(self.random.choice([0.0, 1e-3, 1.0])), int(self.random.choice([1, 4, 8, 99])))
+        self.ask_from_outside(limit)
+
+    def ask_contacts(self, margin: float, most: int) -> None:
+        try:
+            rows = self.python.contacts(margin, max_contacts=most).rows
+        except collide.UnsupportedQuery as error:  # two half-spaces, which both sides name
+            status, _ = self.own.contacts(margin, most)
+            self.compare("endless", np.array([c.ENDLESS_DEPTH]), c.OK, np.array([status]))
+            told = self.own.question_message.split(":")[0].split()
+            named = [f'"body {number}"' for number in told if number.isdigit()]
+            assert all(name in str(error) for name in named) and len(named) == 2, self.own.question_message
+            return
+        self.tally["contact rows"] += len(rows)
+        self.compare("contacts", rows, *self.own.contacts(margin, most))
+
+    def ask_from_outside(self, limit: float) -> None:
+        case = self.drawn(int(self.random.integers(1 << 30)))
+        X_WS = self.python.body(self.some(1)[0]).X_WB if self.random.uniform() < 0.5 else case.X_WB
+        rows = self.python.query(case.B, X_WS, limit).rows
+        self.compare("query", rows, *self.own.query(c.CShape(case.B), X_WS, limit))
+        low = self.random.normal(size=3)
+        ids = np.array(self.python.boxes_near(low, low + 0.5, 0.25), dtype=np.int32)
+        self.compare("boxes", ids, *self.own.boxes_near(low, low + 0.5, 0.25))
+        origins, directions = self.random.normal(size=(2, 12, 3)) * [[[3.0]], [[1.0]]]
+        which = [{}, {"group": 5}, {"mask": 2}, {"group": 3, "mask": 6}][int(self.random.integers(4))]
+        reach = float(self.random.choice([1.0, math.inf]))
+        wanted = self.python.raycast(origins, directions, max_distance=reach, **which).rows
+        status, rows, statuses = self.own.raycast(origins, directions, reach, **which)
+        answered = statuses == c.OK
+        assert (status == c.OK) == answered.all() and (statuses[~answered] == c.UNSUPPORTED).all()
+        self.tally["rays open"] += int((~answered).sum())
+        self.tally["rays hit"] += int(rows["hit"].sum())
+        self.compare("rays", wanted[answered], c.OK, rows[answered])
+        wanted = self.python.nearest(origins, max_distance=reach, **which).rows
+        self.tally["points with a body"] += int(wanted["hit"].sum())
+        self.compare("nearest", wanted, *self.own.nearest(origins, reach, **which))
+
+
+def are_equal(wanted: np.ndarray, rows: np.ndarray) -> bool:
+    """Bit by bit; of hits field by field: numpy leaves what is between their fields as it was."""
+    if wanted.dtype != WORLD_HIT_DTYPE:
+        return wanted.tobytes() == rows.tobytes()
+    return all(wanted[name].tobytes() == rows[name].tobytes() for name in wanted.dtype.names)
+
+
+def scattered(n: int, seed: int = 0) -> tuple[collide.World, CWorld, list[c.CShape]]:
+    """n bodies of a few shapes, a third of which hit something."""
+    random = np.random.default_rng([93, seed])
+    shapes = [collide.Box(random.uniform(0.5, 1.5, 3)) for _ in range(6)]
+    shapes += [collide.Sphere(0.5), collide.Cylinder(0.4, 1), collide.ConvexHull(random.normal(size=(300, 3)) * 0.4)]
+    own, python, made = CWorld(), collide.World(), [c.CShape(shape) for shape in shapes]
+    which, width = random.integers(0, len(shapes), n), (8.0 * n) ** (1 / 3)
+    X_WBs = np.stack([collide.pose(random.uniform(0, width, 3), quat_wxyz=random.normal(size=4)) for _ in range(n)])
+    python.add_many([shapes[k] for k in which], X_WBs)
+    status, ids = own.add_many([(made[k], X, False, 1, 0xFFFF) for k, X in zip(which, X_WBs)])
+    assert status == c.OK and ids == python.ids
+    return python, own, made
+
+
+# --- the same bits ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.many(8)
+@pytest.mark.parametrize("first", range(0, 24, 3))
+def test_random_changes_have_pythons_bits(first):
+    tally, wrong = collections.Counter(), []
+    for seed in range(first, first + 3):
+        both = Both(seed, tally)
+        for _ in range(5):
+            both.add_pair()
+        for both.step in range(12):
+            for _ in range(int(both.random.integers(1, 4))):
+                both.change()
+            both.ask()
+        assert len(both.own) == len(both.python) == len(both.ids)
+        assert all((both.own.pose(body)[1] == both.python.body(body).X_WB).all() for body in both.ids)
+        wrong += both.wrong
+    assert not wrong, f"{len(wrong)} differ, the first: {wrong[0]}"
+    least = {
+        "add": 4, "remove": 4, "far": 4, "near": 8, "replace": 4, "allow": 4, "sleep": 4, "near touching": 8,
+        "exact": 5, "contact rows": 400, "rays hit": 80, "points with a body": 200,
+    }
+    few = {what: tally[what] for what, n in least.items() if tally[what] < n}
+    assert not few and 0.2 < tally["hit rows"] / tally["rows"] < 0.9, (few, tally)
+    assert tally["rays open"] < 0.05 * 12 * tally["rays"], tally
+
+
+def test_a_world_in_motion_has_pythons_bits():
+    """So many bodies that trees are of several parts, fitted along paths and made anew; all move, or a few."""
+    python, own, _ = scattered(400)
+    random, ids = np.random.default_rng(94), np.array(python.ids)
+    X_WBs, n_hits = np.stack([python.body(k).X_WB for k in python.ids]), 0
+    for step in range(24):
+        some = ids if step % 3 == 0 else random.choice(ids, 20, replace=False)
+        far = 10.0 if step % 8 == 7 else 0.02
+        X_WBs[some, :3, 3] += random.normal(size=(len(some), 3)) * far
+        python.set_poses(some, X_WBs[some])
+        assert own.move(some, X_WBs[some]) == c.OK
+        rows, contacts = python.collisions().rows, python.contacts(0.05).rows
+        assert own.collisions()[1].tobytes() == rows.tobytes(), step
+        assert own.contacts(0.05)[1].tobytes() == contacts.tobytes(), step
+        assert own.minimum()[1].tobytes() == python.minimum().rows.tobytes(), step
+        assert own.collides() == (c.OK, bool(len(rows)))
+        n_hits += len(rows)
+    assert n_hits > 1000, n_hits
+
+
+def test_coming_and_going_has_pythons_bits():
+    """Bodies added one by one and removed at random: rows of removed bodies are closed up, shapes and pairs stay."""
+    python, own, _ = scattered(30)
+    random, ids, n_hits = np.random.default_rng(95), python.ids, 0
+    shapes = [python.body(k).shape for k in ids[:9]] + [collide.Halfspace((0, 0, 1), -1e3)]
+    shapes = [(shape, c.CShape(shape)) for shape in shapes]
+    for step in range(900):
+        shape, in_c = shapes[-1 if step % 200 == 199 else int(random.integers(len(shapes) - 1))]
+        X, static = collide.pose(random.uniform(0, 6, 3), quat_wxyz=random.normal(size=4)), bool(random.uniform() < 0.3)
+        ids.append(python.add(shape, X, static=static))
+        assert own.add(in_c, X, static) == (c.OK, ids[-1])
+        if step % 5 == 0:
+            pair = random.choice(ids, 2, replace=False).tolist()
+            python.allow(*pair)
+            assert own.allow([pair]) == c.OK
+        while len(ids) > 40:
+            body = ids.pop(int(random.integers(len(ids))))
+            python.remove(body)
+            assert own.remove(body) == c.OK and own.remove(body) == c.INVALID_ARGUMENT
+        if step % 30 == 0:
+            rows = python.distances(0.3).rows
+            assert own.distances(0.3)[1].tobytes() == rows.tobytes(), step
+            assert are_equal(python.nearest(np.zeros(3)).rows, own.nearest(np.zeros(3))[1]), step
+            n_hits += int(rows["hit"].sum())
+    assert n_hits > 300 and own.pose(ids[-1])[0] == c.OK, n_hits
+
+
+def test_four_threads_at_once_have_pythons_bits():
+    """A world that nobody changes, each thread with a workspace: hulls get their faces while others ask for them."""
+    python, own, _ = scattered(300, seed=1)
+    points = np.random.default_rng(96).uniform(0, 12, (40, 3))
+    wanted = (
+        python.collisions().rows, python.distances(0.2).rows, python.contacts(0.1).rows, python.minimum().rows,
+        python.nearest(points).rows,
+    )
+
+    def answers(_) -> list[bool]:
+        asker, equal = c.Asker(), []
+        for _ in range(5):
+            given = (
+                own.collisions(asker), own.distances(0.2, asker), own.contacts(0.1, asker=asker),
+                own.minimum(asker=asker), own.nearest(points, asker=asker),
+            )
+            equal += [status == c.OK and are_equal(rows, one) for rows, (status, one) in zip(wanted, given)]
+        return equal
+
+    with ThreadPoolExecutor(4) as pool:
+        assert all(all(equal) for equal in pool.map(answers, range(4)))
+    assert len(wanted[0]) > 50
+
+
+def test_rays_along_faces_are_left_open_and_never_guessed():
+    """On the brink of boxes, where Python answers in integers: what C answers is the same, and some are left open."""
+    python, own = collide.World(), CWorld()
+    box, n_open, n_hit = collide.Box(1, 1, 1), 0, 0
+    in_c = c.CShape(box)
+    for k in range(5):
+        python.add(box, c.identity_at(2.0 * k, 0, 0))
+        own.add(in_c, c.identity_at(2.0 * k, 0, 0))
+    origins = np.array([[-3.0, y, z] for y in (-0.5, 0.0, 0.5) for z in (-0.5, 0.25, 0.5, np.nextafter(0.5, 1.0))])
+    for direction in ((1.0, 0, 0), (1.0, 1e-17, 0)):
+        wanted = python.raycast(origins, np.array(direction)).rows
+        status, rows, statuses = own.raycast(origins, np.tile(direction, (len(origins), 1)))
+        for k, one in enumerate(statuses.tolist()):
+            if one == c.OK:
+                assert are_equal(wanted[k : k + 1], rows[k : k + 1]), (k, wanted[k], rows[k])
+                n_hit += int(rows["hit"][k])
+            else:
+                assert one == status == c.UNSUPPORTED and not rows["hit"][k] and rows["certified"][k] == 0
+                n_open += 1
+    assert n_open >= 4 and n_hit >= 2 and "ray 0 touches" in own.question_message, (n_open, n_hit)
+
+
+# --- room, and what is refused ----------------------------------------------------------------------------------------
+
+
+def test_rows_beyond_the_room_are_counted():
+    python, own, _ = scattered(60, seed=2)
+    for what, wanted in (
+        ("collisions", python.collisions().rows), ("distances", python.distances().rows),
+        ("contacts", python.contacts().rows), ("boxes", np.array(python.ids, dtype=np.int32)),
+    ):
+        ask = {
+            "collisions": own.collisions, "distances": own.distances, "contacts": own.contacts,
+            "boxes": lambda capacity: own.boxes_near([-math.inf] * 3, [math.inf] * 3, capacity=capacity),
+        }[what]
+        n = len(wanted)
+        for capacity in (0, 1, n - 1, n, n + 5):
+            status, rows = ask(capacity=capacity)
+            assert status == (c.OK if capacity >= n else c.TOO_MANY), (what, capacity)
+            assert rows.tobytes() == wanted[:capacity].tobytes(), (what, capacity)
+            assert capacity >= n or f"{n} " in own.question_message, own.question_message
+    assert n == 60
+
+
+def test_an_empty_world_is_met_by_nothing():
+    own = CWorld()
+    assert own.collides() == (c.OK, False) and len(own) == 0
+    for status, rows in (own.collisions(), own.distances(), own.minimum(), own.contacts(1.0)):
+        assert status == c.OK and len(rows) == 0
+    assert own.boxes_near([-1.0] * 3, [1.0] * 3)[1].tolist() == []
+    wanted = collide.World().nearest((0, 0, 0)).rows
+    assert are_equal(wanted, own.nearest((0, 0, 0))[1]) and are_equal(wanted, own.raycast((0, 0, 0), (1.0, 0, 0))[1])
+    assert own.add_many([]) == (c.OK, []) and own.move([], np.zeros((0, 4, 4))) == c.OK
+
+
+def test_refused_changes_name_what_is_to_blame_and_change_nothing():
+    own, ball, good = CWorld(), c.CShape(collide.Sphere(1.0)), np.eye(4)
+    assert [own.add(ball, c.identity_at(k, 0, 0))[1] for k in range(4)] == [0, 1, 2, 3]
+    assert own.remove(2) == c.OK and own.message == ""
+    before = own.collisions()[1].tobytes()
+    bad = np.stack([good, np.diag([2.0, 1, 1, 1])])
+    other, empty = CBody(0, ball.handle, None, 0, 1, 1), CBody(ctypes.sizeof(CBody), None, None, 0, 1, 1)
+    ids = np.zeros(2, dtype=np.int32)
+    add = c.library().collide_world_add
+    for status, wanted, text in (
+        (
+            lambda: own.add_many([(ball, good, False, 1, 1), (ball, bad[1], False, 1, 1)])[0], c.INVALID_POSE,
+            "collide_world_add: bodies[1]: X_WB is no pose",
+        ),
+        (lambda: add(own.handle, ctypes.byref(other), 1, ids.ctypes.data), c.INVALID_ARGUMENT, "bodies[0]: size is 0"),
+        (lambda: add(own.handle, ctypes.byref(empty), 1, ids.ctypes.data), c.INVALID_ARGUMENT, "shape is NULL"),
+        (lambda: add(own.handle, None, 1, ids.ctypes.data), c.INVALID_ARGUMENT, "bodies is NULL"),
+        (lambda: own.remove(2), c.INVALID_ARGUMENT, "no body has id 2; it may have been removed"),
+        (lambda: own.move([0, 2], np.stack([good, good])), c.INVALID_ARGUMENT, "ids[1]: no body has id 2"),
+        (lambda: own.move([0, 3], bad), c.INVALID_POSE, "collide_world_move: X_WBs[1], of body 3, is no pose"),
+        (lambda: own.replace(77, ball), c.INVALID_ARGUMENT, "no body has id 77"),
+        (lambda: own.sleep([0, -1], True), c.INVALID_ARGUMENT, "ids[1]: no body has id -1"),
+        (lambda: own.allow([[0, 1], [3, 3]]), c.INVALID_ARGUMENT, "pair 1 is body 3 twice"),
+        (lambda: own.allow([[0, 2]]), c.INVALID_ARGUMENT, "pairs[1]: no body has id 2"),
+    ):
+        assert status() == wanted and text in own.message, (text, own.message)
+    assert own.collisions()[1].tobytes() == before and len(own) == 3
+    assert own.pose(2)[0] == c.INVALID_ARGUMENT
+
+
+def test_refused_questions_name_what_is_to_blame():
+    own, asker, count = CWorld(), c.Asker(), ctypes.c_size_t()
+    ball = c.CShape(collide.Sphere(1.0))
+    own.add(ball, np.eye(4))
+    own.asker = asker
+    zero, away = np.zeros((2, 3)), np.array([[1.0, 0, 0], [0, 0, 0]])
+    ask = c.library().collide_world_collisions
+    for status, wanted, text in (
+        (lambda: ask(own.handle, asker.handle, None, 4, count), c.INVALID_ARGUMENT, "rows or count is NULL"),
+        (lambda: ask(None, asker.handle, None, 0, count), c.INVALID_ARGUMENT, "world is NULL"),
+        (lambda: own.distances(-1.0)[0], c.INVALID_ARGUMENT, "max_distance is below 0"),
+        (lambda: own.distances(math.nan)[0], c.INVALID_ARGUMENT, "max_distance is below 0"),
+        (lambda: own.contacts(math.inf)[0], c.INVALID_ARGUMENT, "margin is outside"),
+        (lambda: own.contacts(0.0, 0)[0], c.INVALID_ARGUMENT, "max_contacts is 0"),
+        (lambda: own.query(ball, np.diag([1.0, 1, -1, 1]))[0], c.INVALID_POSE, "X_WS is no pose"),
+        (lambda: own.raycast(zero, away)[0], c.INVALID_ARGUMENT, "directions_W[1] is 0"),
+        (lambda: own.raycast([[math.nan, 0, 0]], [[1.0, 0, 0]])[0], c.INVALID_ARGUMENT, "origins_W[0]"),
+        (lambda: own.nearest([[0, 0, 0], [1e51, 0, 0]])[0], c.INVALID_ARGUMENT, "points_W[1]"),
+        (lambda: own.boxes_near([0, 0, 1], [0, 0, 0])[0], c.INVALID_ARGUMENT, "low <= high"),
+    ):
+        assert status() == wanted and text in own.question_message, (text, own.question_message)
+    assert own.collides() == (c.OK, False) and own.question_message == ""
+    assert ask(own.handle, None, None, 0, count) == c.INVALID_ARGUMENT
+
+
+def test_pairs_too_small_to_measure_are_named():
+    """Shapes and distance below 1e-50 m together: both refuse, C with the ids."""
+    python, own = collide.World(), CWorld()
+    points = [collide.ConvexHull([[0.0, 0, 0]]), collide.ConvexHull([[0.0, 0, 0], [1e-50, 0, 0]])]
+    made = [c.CShape(shape) for shape in points]
+    for k in (0, 1, 1):
+        python.add(points[k])
+        own.add(made[k], np.eye(4))
+    try:
+        wanted = python.distances().rows
+    except collide.UnsupportedQuery:
+        status, _ = own.distances()
+        assert status == c.OUT_OF_RANGE and own.question_message.startswith("bodies "), own.question_message
+    else:
+        assert own.distances()[1].tobytes() == wanted.tobytes() and wanted.dtype == PAIR_DTYPE
