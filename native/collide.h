@@ -11,15 +11,17 @@
    Errors. Every function that can fail returns a collide_status and, unless that is COLLIDE_OK, leaves the objects that it
    was to make NULL. Nothing prints, nothing ends the process, nothing jumps.
 
-   Memory. Shapes, sets of shapes, unions, meshes, fields and workspaces are made by functions of this header and freed by the caller with
-   collide_..._free, which take NULL. Numbers handed in are copied. Queries allocate nothing, but for contacts: the first ones of a
-   hull work out its faces, which are kept with it, and the first ones of a workspace what manifolds are made in; but for the
-   first casts, motions and unions of a workspace, which make its room for them, and each new pair of unions; and but for fields, where a walk leaves a pair open: then a
-   list of the items nearby.
+   Memory. Shapes, sets of shapes, unions, meshes, fields, worlds and workspaces are made by functions of this header and freed by
+   the caller with collide_..._free, which take NULL. Numbers handed in are copied. Queries allocate nothing, but for contacts: the
+   first ones of a hull work out its faces, which are kept with it, and the first ones of a workspace what manifolds are made in;
+   but for the first casts, motions and unions of a workspace, which make its room for them, and each new pair of unions; but for
+   fields, where a walk leaves a pair open: then a list of the items nearby; and but for worlds, whose lists of pairs are kept with
+   the workspace, and grow.
 
-   Threads. A shape, a set, a union, a mesh or a field never changes: any number of threads may use one at once. A workspace is for one
-   thread at a time: give each thread its own. Nothing else is shared. The answers do not depend on the caller's rounding mode, nor
-   on whether it flushes small numbers to 0: both are set for the length of a call, and put back.
+   Threads. A shape, a set, a union, a mesh or a field never changes: any number of threads may use one at once. A workspace is for
+   one thread at a time: give each thread its own. A world may be asked by many at once while nobody changes it. Nothing else is
+   shared. The answers do not depend on the caller's rounding mode, nor on whether it flushes small numbers to 0: both are set for
+   the length of a call, and put back.
 
    Processors. The kernels are those of the best level that the processor has; the environment's variable COLLIDE_CPU names
    another one ("v2", "v3", "v4"), read when the first workspace, mesh or shape is made. */

@@ -149,6 +149,9 @@ def test_examples_are_built_by_make_and_run(tmp_path):
     told = run(tmp_path / "c" / "point_cloud", env=bare)
     assert "cloud: met from z = 0.50 m on; from 1 m it is 0.4900 m away, item 5050" in told
     assert "voxels: met from z = 0.50 m on" in told and "101 points are within 0.2 m of it" in told
+    told = run(tmp_path / "c" / "falling_boxes", env=bare)
+    assert "5.00 s: 24 contacts, the top box is at 1.64" in told
+    assert "at rest: yes; a stack of 6 boxes is 1.79" in told
     told = run(tmp_path / "c" / "threads", env=bare)
     assert "1838 of 4000 pairs meet" in told and "4000 answers of four threads are those of one" in told
 
