@@ -43,6 +43,8 @@ C_SOURCES = [
     "host_terrain_bodies.c", "host_terrain_deep.c", "host_terrain_facets.c", "host_terrain_near.c",
     "host_terrain_prisms.c", "host_terrain_rows.c",
 ]
+#: Headers of programs that use it.
+HEADERS = ["collide.h"]
 WINDOWS, MACOS = sys.platform == "win32", sys.platform == "darwin"
 LIBRARY = "collide.dll" if WINDOWS else "libcollide.dylib" if MACOS else "libcollide.so"
 
@@ -152,13 +154,19 @@ class BuildLibrary(build_ext):
         ]
 
     def _write_interface(self, place: Path) -> None:
-        """What C programs need beside the library: the header, and the file that pkg-config reads."""
-        for folder in (place / "include", place / "lib" / "pkgconfig"):
-            folder.mkdir(parents=True, exist_ok=True)
-        shutil.copy(NATIVE / "collide.h", place / "include")
-        text = (NATIVE / "collide.pc.in").read_text(encoding="utf-8")
-        version = self.distribution.get_version()
-        (place / "lib" / "pkgconfig" / "collide.pc").write_text(text.replace("@VERSION@", version), encoding="utf-8")
+        """What programs in C need beside the library: headers, and files by which pkg-config and CMake find both."""
+        places = {"collide.pc": "pkgconfig", "collideConfig.cmake": "cmake/collide"}
+        places["collideConfigVersion.cmake"] = places["collideConfig.cmake"]
+        filled = {"@VERSION@": self.distribution.get_version(), "@LIBRARY@": LIBRARY}
+        (place / "include").mkdir(parents=True, exist_ok=True)
+        for header in HEADERS:
+            shutil.copy(NATIVE / header, place / "include")
+        for name, folder in places.items():
+            text = (NATIVE / f"{name}.in").read_text(encoding="utf-8")
+            for word, value in filled.items():
+                text = text.replace(word, value)
+            (place / "lib" / folder).mkdir(parents=True, exist_ok=True)
+            (place / "lib" / folder / name).write_text(text, encoding="utf-8")
 
     def _compiled(self, names: list[str], generated: Path) -> list[str]:
         """Object files of modules of C, each kept under a hash of all that it is made from."""

@@ -154,6 +154,10 @@ def test_wheel_has_the_library_and_what_c_programs_need(wheel):
     assert "collide/include/collide.h" in made and "collide/kernels/built.py" in made
     assert "collide/lib/pkgconfig/collide.pc" in made and set(LIBRARY.values()) & set(made)
     assert f"Version: {collide.__version__}\n".encode() in wheel.read("collide/lib/pkgconfig/collide.pc")
+    cmake = {name.rpartition("/")[2]: wheel.read(name).decode() for name in made if "/lib/cmake/collide/" in name}
+    assert set(cmake) == {"collideConfig.cmake", "collideConfigVersion.cmake"}
+    assert f'set(PACKAGE_VERSION "{collide.__version__}")' in cmake["collideConfigVersion.cmake"]
+    assert not re.search(r"@[A-Z]+@", "".join(cmake.values())), "a place left open by the build"
 
 
 def test_library_leaves_nothing_open_but_the_c_library(wheel, tmp_path):
