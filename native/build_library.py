@@ -44,7 +44,7 @@ C_SOURCES = [
     "host_terrain_prisms.c", "host_terrain_rows.c",
 ]
 #: Headers of programs that use it.
-HEADERS = ["collide.h"]
+HEADERS = ["collide.h", "collide.hpp"]
 WINDOWS, MACOS = sys.platform == "win32", sys.platform == "darwin"
 LIBRARY = "collide.dll" if WINDOWS else "libcollide.dylib" if MACOS else "libcollide.so"
 
@@ -150,7 +150,7 @@ class BuildLibrary(build_ext):
         return [
             file.relative_to(ROOT).as_posix()
             for file in sorted(NATIVE.rglob("*"))
-            if file.suffix in (".py", ".c", ".h", ".in")
+            if file.suffix in (".py", ".c", ".h", ".hpp", ".in")
         ]
 
     def _write_interface(self, place: Path) -> None:

@@ -151,7 +151,8 @@ def test_wheel_is_of_its_platform_and_of_every_python(wheel_file):
 
 def test_wheel_has_the_library_and_what_c_programs_need(wheel):
     made = sorted(name for name in wheel.namelist() if MADE.fullmatch(name))
-    assert "collide/include/collide.h" in made and "collide/kernels/built.py" in made
+    assert {"collide/include/collide.h", "collide/include/collide.hpp"} <= set(made)
+    assert "collide/kernels/built.py" in made
     assert "collide/lib/pkgconfig/collide.pc" in made and set(LIBRARY.values()) & set(made)
     assert f"Version: {collide.__version__}\n".encode() in wheel.read("collide/lib/pkgconfig/collide.pc")
     cmake = {name.rpartition("/")[2]: wheel.read(name).decode() for name in made if "/lib/cmake/collide/" in name}

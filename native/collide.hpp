@@ -1,0 +1,423 @@
+// collide for C++17: collide.h with owners, exceptions and containers. Header only; link libcollide as C does.
+//
+//     collide::Workspace workspace;
+//     auto box = collide::Shape::box({1.0, 2.0, 0.5}), ball = collide::Shape::sphere(0.25);
+//     collide_pair pair = workspace.distance(box, ball, collide::Pose(), collide::Pose::at(2.0, 0.0, 0.0));
+//
+// Owners. Each class holds a handle of collide.h, which `get` shows and the destructor frees: moved, never copied. A moved-from
+// object holds nothing. What is said in collide.h of functions, units, frames and threads holds.
+//
+// Errors. Whatever is not COLLIDE_OK is thrown as collide::Error, with its status and, of batches, the number of the pair.
+//
+// Arrays. Span takes a std::vector, a std::array, an array of C, or pointer and size; Pose is 16 doubles, row by row, so that a
+// std::vector<Pose> is a batch without a copy. With Eigen on the include path, Pose is made of its transforms and matrices too.
+#ifndef COLLIDE_HPP
+#define COLLIDE_HPP
+
+#include <collide.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#if defined(__has_include) && !defined(COLLIDE_WITHOUT_EIGEN)
+#if __has_include(<Eigen/Core>) && __has_include(<Eigen/Geometry>)
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#define COLLIDE_WITH_EIGEN 1
+#endif
+#endif
+
+namespace collide {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr std::size_t none = static_cast<std::size_t>(-1);
+
+// --- errors ----------------------------------------------------------------------------------------------------------------
+
+class Error : public std::runtime_error {
+public:
+    explicit Error(collide_status status, std::size_t index = none)
+        : std::runtime_error(text(status, index)), status_(status), index_(index) {}
+    collide_status status() const noexcept { return status_; }
+    // The number of the pair of a batch that is to blame; `none` of single calls.
+    std::size_t index() const noexcept { return index_; }
+
+private:
+    static std::string text(collide_status status, std::size_t index) {
+        std::string about = "collide: ";
+        if (index != none) about += "pair " + std::to_string(index) + ": ";
+        return about + collide_status_text(status);
+    }
+    collide_status status_;
+    std::size_t index_;
+};
+
+inline void require(collide_status status, std::size_t index = none) {
+    if (status != COLLIDE_OK) throw Error(status, index);
+}
+
+// --- arrays ----------------------------------------------------------------------------------------------------------------
+
+// Elements that somebody else owns.
+template <class T>
+class Span {
+public:
+    constexpr Span() noexcept = default;
+    constexpr Span(T *data, std::size_t size) noexcept : data_(data), size_(size) {}
+    template <std::size_t N>
+    constexpr Span(T (&array)[N]) noexcept : data_(array), size_(N) {}
+    template <class C, class = std::enable_if_t<std::is_convertible_v<decltype(std::declval<C &>().data()), T *> &&
+                                                std::is_integral_v<decltype(std::declval<C &>().size())>>>
+    constexpr Span(C &&container) noexcept : data_(container.data()), size_(static_cast<std::size_t>(container.size())) {}
+    constexpr T *data() const noexcept { return data_; }
+    constexpr std::size_t size() const noexcept { return size_; }
+    constexpr bool empty() const noexcept { return size_ == 0; }
+    constexpr T &operator[](std::size_t k) const { return data_[k]; }
+    constexpr T *begin() const noexcept { return data_; }
+    constexpr T *end() const noexcept { return data_ + size_; }
+
+private:
+    T *data_ = nullptr;
+    std::size_t size_ = 0;
+};
+
+// How many rows of `width` numbers there are. Throws where numbers are left over.
+template <class T>
+std::size_t rows(Span<T> numbers, std::size_t width) {
+    if (numbers.size() % width != 0) throw Error(COLLIDE_INVALID_ARGUMENT);
+    return numbers.size() / width;
+}
+
+using Vector = std::array<double, 3>;
+
+// A pose X_WB: a 4x4 matrix row by row, p_W = X_WB p_B; the identity at first.
+struct Pose {
+    std::array<double, 16> m{1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0};
+
+    Pose() = default;
+    Pose(const std::array<double, 16> &row_by_row) : m(row_by_row) {}
+    static Pose at(double x, double y, double z) {
+        Pose made;
+        made.m[3] = x, made.m[7] = y, made.m[11] = z;
+        return made;
+    }
+    static Pose at(const Vector &place) { return at(place[0], place[1], place[2]); }
+    const double *data() const noexcept { return m.data(); }
+    double operator()(int row, int column) const { return m[static_cast<std::size_t>(4 * row + column)]; }
+#ifdef COLLIDE_WITH_EIGEN
+    // Of a 4x4 matrix in whichever order it is stored, or of a transform such as Eigen::Isometry3d.
+    template <class Derived>
+    Pose(const Eigen::MatrixBase<Derived> &matrix) {
+        static_assert(Derived::RowsAtCompileTime == 4 && Derived::ColsAtCompileTime == 4, "a pose is a 4x4 matrix");
+        map() = matrix;
+    }
+    template <int Mode, int Options>
+    Pose(const Eigen::Transform<double, 3, Mode, Options> &X_WB) {
+        static_assert(Mode != int(Eigen::Projective), "a pose keeps parallels: its last row is 0 0 0 1");
+        map().template topRows<3>() = X_WB.matrix().template topRows<3>();
+    }
+    Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> map() {
+        return Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(m.data());
+    }
+    Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> map() const {
+        return Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(m.data());
+    }
+#endif
+};
+static_assert(sizeof(Pose) == 16 * sizeof(double) && std::is_trivially_copyable_v<Pose>, "poses lie one behind another");
+
+#ifdef COLLIDE_WITH_EIGEN
+// Three doubles of a row, such as pair.normal, as a vector of Eigen's.
+inline Eigen::Map<const Eigen::Vector3d> vector(const double (&row)[3]) { return Eigen::Map<const Eigen::Vector3d>(row); }
+#endif
+
+// The poses of a batch; a single one goes with all of the other body's.
+struct Poses : Span<const Pose> {
+    using Span<const Pose>::Span;
+    Poses(const Pose &one) : Span<const Pose>(&one, 1) {}
+    operator collide_poses() const { return {empty() ? nullptr : data()->data(), size()}; }
+};
+inline std::size_t pairs_of(Poses A, Poses B) { return A.empty() || B.empty() ? 0 : std::max(A.size(), B.size()); }
+
+// --- owners ----------------------------------------------------------------------------------------------------------------
+
+// Owns a handle that a function of collide.h made and `Free` frees.
+template <class H, void (*Free)(H *)>
+class Owner {
+public:
+    explicit Owner(H *handle) noexcept : handle_(handle) {}
+    H *get() const noexcept { return handle_.get(); }
+    explicit operator bool() const noexcept { return handle_ != nullptr; }
+
+protected:
+    // What `function` makes of arguments: its last one is where the handle goes.
+    template <class Function, class... Arguments>
+    static H *made(Function function, Arguments... arguments) {
+        H *handle = nullptr;
+        require(function(arguments..., &handle));
+        return handle;
+    }
+
+private:
+    struct Deleter {
+        void operator()(H *handle) const noexcept { Free(handle); }
+    };
+    std::unique_ptr<H, Deleter> handle_;
+};
+
+class Shape : public Owner<collide_shape, collide_shape_free> {
+public:
+    using Owner::Owner;
+    static Shape sphere(double radius) { return Shape(made(collide_sphere, radius)); }
+    static Shape box(const Vector &size) { return Shape(made(collide_box, size.data())); }
+    static Shape capsule(double radius, double length) { return Shape(made(collide_capsule, radius, length)); }
+    static Shape cylinder(double radius, double length) { return Shape(made(collide_cylinder, radius, length)); }
+    static Shape cone(double radius, double length) { return Shape(made(collide_cone, radius, length)); }
+    static Shape ellipsoid(const Vector &radii) { return Shape(made(collide_ellipsoid, radii.data())); }
+    static Shape halfspace(const Vector &normal, double offset) {
+        return Shape(made(collide_halfspace, normal.data(), offset));
+    }
+    // points : x y z of each.
+    static Shape hull(Span<const double> points, double radius = 0.0) {
+        return Shape(made(collide_hull, points.data(), rows(points, 3), radius));
+    }
+    // normals : x y z of each.
+    static Shape hpolytope(Span<const double> normals, Span<const double> offsets) {
+        if (normals.size() != 3 * offsets.size()) throw Error(COLLIDE_INVALID_ARGUMENT);
+        return Shape(made(collide_hpolytope, normals.data(), offsets.data(), offsets.size()));
+    }
+};
+
+// Shapes under numbers, which it does not own: they outlive it.
+class ShapeSet : public Owner<collide_shape_set, collide_shape_set_free> {
+public:
+    using Owner::Owner;
+    explicit ShapeSet(Span<const collide_shape *const> shapes)
+        : Owner(made(collide_shape_set_create, shapes.data(), shapes.size())) {}
+    explicit ShapeSet(Span<const Shape> shapes) : ShapeSet(handles(shapes)) {}
+
+private:
+    static std::vector<const collide_shape *> handles(Span<const Shape> shapes) {
+        std::vector<const collide_shape *> made;
+        for (const Shape &shape : shapes) made.push_back(shape.get());
+        return made;
+    }
+};
+
+class Mesh : public Owner<collide_mesh, collide_mesh_free> {
+public:
+    using Owner::Owner;
+    // vertices : x y z of each.   faces : three numbers of vertices each.   solid : COLLIDE_SURFACE, _SOLID, _SOLID_IF_CLOSED.
+    Mesh(Span<const double> vertices, Span<const std::int32_t> faces, int solid = COLLIDE_SOLID_IF_CLOSED)
+        : Owner(made(collide_mesh_create, vertices.data(), rows(vertices, 3), faces.data(), rows(faces, 3), solid)) {}
+    explicit Mesh(const Shape &shape) : Owner(made(collide_mesh_of_shape, shape.get())) {}
+};
+
+class Field : public Owner<collide_field, collide_field_free> {
+public:
+    using Owner::Owner;
+    // points : x y z of each.   radii : one for all, or one each.
+    static Field point_cloud(Span<const double> points, Span<const double> radii) {
+        return Field(made(collide_point_cloud_create, points.data(), rows(points, 3), radii.data(), radii.size()));
+    }
+    static Field point_cloud(Span<const double> points, double radius) {
+        return point_cloud(points, Span<const double>(&radius, 1));
+    }
+    // occupied : a byte a cell, cell i, j, k at (i cells[1] + j) cells[2] + k.
+    static Field voxel_grid(Span<const std::uint8_t> occupied, const std::array<std::size_t, 3> &cells, const Vector &cell,
+                            const Vector &origin = {}) {
+        std::size_t left = occupied.size();
+        for (std::size_t n : cells) left = n != 0 && left % n == 0 ? left / n : 0; // never a product, which may overflow
+        if (left != 1) throw Error(COLLIDE_INVALID_ARGUMENT);
+        return Field(made(collide_voxel_grid_create, occupied.data(), cells.data(), cell.data(), origin.data()));
+    }
+
+    struct Nearest {
+        std::vector<double> distances;  // k a place; infinite where there are fewer
+        std::vector<std::int64_t> rows; // and -1
+    };
+    // places : x y z of each.
+    Nearest nearest(Span<const double> places, std::size_t k, double max_distance = infinity) const {
+        std::size_t n = rows(places, 3);
+        if (k == 0 || n > none / sizeof(double) / k) throw Error(COLLIDE_INVALID_ARGUMENT);
+        Nearest found{std::vector<double>(n * k), std::vector<std::int64_t>(n * k)};
+        require(collide_point_cloud_nearest(get(), places.data(), n, k, max_distance, found.distances.data(), found.rows.data()));
+        return found;
+    }
+    // Numbers of the points within a distance of a place, ascending.
+    std::vector<std::int64_t> within(const Vector &place, double r) const {
+        std::size_t count = 0;
+        collide_status status = collide_point_cloud_within(get(), place.data(), r, nullptr, 0, &count);
+        if (status != COLLIDE_TOO_MANY) require(status);
+        std::vector<std::int64_t> found(count);
+        if (count != 0) require(collide_point_cloud_within(get(), place.data(), r, found.data(), count, &count));
+        return found;
+    }
+};
+
+// --- questions -------------------------------------------------------------------------------------------------------------
+
+// n rows, written by a function that tells which of them is to blame where one fails.
+template <class Row, class Ask>
+std::vector<Row> answers(std::size_t n, Ask ask) {
+    std::vector<Row> rows(n);
+    std::size_t failed = none;
+    collide_status status = ask(rows.data(), &failed);
+    require(status, failed);
+    return rows;
+}
+
+// Rows of contacts of many pairs: those of pair k are starts[k] to starts[k + 1] - 1.
+struct Contacts {
+    std::vector<collide_contact> rows;
+    std::vector<std::size_t> starts;
+    Span<const collide_contact> of(std::size_t pair) const {
+        return {rows.data() + starts.at(pair), starts.at(pair + 1) - starts.at(pair)};
+    }
+};
+
+// Rows of which some may be without an answer: where statuses[k] is not COLLIDE_OK row k is zeros.
+struct PairsOfField {
+    std::vector<collide_pair> pairs;
+    std::vector<collide_status> statuses;
+};
+
+// Scratch memory, one a thread, and the questions asked with it. `collides` is collide_collide of whatever kind of body.
+// which : two numbers of a set's shapes a pair.   axes : none, or 3 doubles a pair, read and written.
+class Workspace : public Owner<collide_workspace, collide_workspace_free> {
+public:
+    using Owner::Owner;
+    Workspace() : Owner(made(collide_workspace_create)) {}
+
+    bool collides(const Shape &A, const Shape &B, const Pose &X_WA, const Pose &X_WB, unsigned flags = 0) {
+        return boolean(collide_collide, A, B, X_WA, X_WB, flags);
+    }
+    bool collides(const Mesh &A, const Mesh &B, const Pose &X_WA, const Pose &X_WB, unsigned flags = 0) {
+        return boolean(collide_mesh_collide, A, B, X_WA, X_WB, flags);
+    }
+    bool collides(const Field &field, const Shape &shape, const Pose &X_WF, const Pose &X_WS, unsigned flags = 0) {
+        return boolean(collide_field_collide, field, shape, X_WF, X_WS, flags);
+    }
+
+    collide_pair distance(const Shape &A, const Shape &B, const Pose &X_WA, const Pose &X_WB, double max_distance = infinity,
+                          unsigned flags = 0) {
+        return row(collide_distance, A, B, X_WA, X_WB, max_distance, flags);
+    }
+    collide_pair distance(const Mesh &A, const Mesh &B, const Pose &X_WA, const Pose &X_WB, unsigned flags = 0) {
+        return row(collide_mesh_distance, A, B, X_WA, X_WB, flags);
+    }
+    collide_pair distance(const Field &field, const Shape &shape, const Pose &X_WF, const Pose &X_WS,
+                          double max_distance = infinity, unsigned flags = COLLIDE_UNSIGNED) {
+        return row(collide_field_distance, field, shape, X_WF, X_WS, max_distance, flags);
+    }
+
+    std::vector<std::uint8_t> collides_batch(const Shape &A, const Shape &B, Poses X_WA, Poses X_WB, unsigned flags = 0,
+                                             Span<double> axes = {}) {
+        std::size_t n = pairs_of(X_WA, X_WB);
+        return answers<std::uint8_t>(n, [&](std::uint8_t *hits, std::size_t *failed) {
+            return collide_collide_batch(get(), A.get(), B.get(), X_WA, X_WB, flags, checked(axes, n), hits, failed);
+        });
+    }
+    std::vector<std::uint8_t> collides_batch(const Field &field, const Shape &shape, Poses X_WF, Poses X_WS, unsigned flags = 0) {
+        return answers<std::uint8_t>(pairs_of(X_WF, X_WS), [&](std::uint8_t *hits, std::size_t *failed) {
+            return collide_field_collide_batch(get(), field.get(), shape.get(), X_WF, X_WS, flags, hits, failed);
+        });
+    }
+    std::vector<std::uint8_t> collides_each(const ShapeSet &set, Span<const std::int64_t> which, Poses X_WA, Poses X_WB,
+                                            unsigned flags = 0, Span<double> axes = {}) {
+        std::size_t n = rows(which, 2);
+        return answers<std::uint8_t>(n, [&](std::uint8_t *hits, std::size_t *failed) {
+            return collide_collide_each(get(), set.get(), which.data(), n, X_WA, X_WB, flags, checked(axes, n), hits, failed);
+        });
+    }
+
+    std::vector<collide_pair> distance_batch(const Shape &A, const Shape &B, Poses X_WA, Poses X_WB,
+                                             double max_distance = infinity, unsigned flags = 0) {
+        return answers<collide_pair>(pairs_of(X_WA, X_WB), [&](collide_pair *pairs, std::size_t *failed) {
+            return collide_distance_batch(get(), A.get(), B.get(), X_WA, X_WB, max_distance, flags, pairs, failed);
+        });
+    }
+    PairsOfField distance_batch(const Field &field, const Shape &shape, Poses X_WF, Poses X_WS, double max_distance = infinity,
+                                unsigned flags = COLLIDE_UNSIGNED) {
+        std::size_t n = pairs_of(X_WF, X_WS);
+        std::vector<collide_status> statuses(n);
+        auto pairs = answers<collide_pair>(n, [&](collide_pair *pairs, std::size_t *failed) {
+            collide_status status = collide_field_distance_batch(get(), field.get(), shape.get(), X_WF, X_WS, max_distance, flags,
+                                                                 pairs, statuses.data(), failed);
+            bool is_of_a_row = status == COLLIDE_UNSUPPORTED || status == COLLIDE_OUT_OF_RANGE || status == COLLIDE_ENDLESS_DEPTH;
+            return is_of_a_row ? COLLIDE_OK : status;
+        });
+        return {std::move(pairs), std::move(statuses)};
+    }
+    std::vector<collide_pair> distance_each(const ShapeSet &set, Span<const std::int64_t> which, Poses X_WA, Poses X_WB,
+                                            double max_distance = infinity, unsigned flags = 0) {
+        std::size_t n = rows(which, 2);
+        return answers<collide_pair>(n, [&](collide_pair *pairs, std::size_t *failed) {
+            return collide_distance_each(get(), set.get(), which.data(), n, X_WA, X_WB, max_distance, flags, pairs, failed);
+        });
+    }
+
+    std::vector<collide_contact> contacts(const Shape &A, const Shape &B, const Pose &X_WA, const Pose &X_WB, double margin = 0.0,
+                                          std::size_t max_contacts = 4, unsigned flags = 0) {
+        std::vector<collide_contact> found(max_contacts);
+        std::size_t count = 0;
+        require(collide_contacts(get(), A.get(), B.get(), X_WA.data(), X_WB.data(), margin, max_contacts, flags, found.data(),
+                                 &count));
+        found.resize(count);
+        return found;
+    }
+    Contacts contacts_batch(const Shape &A, const Shape &B, Poses X_WA, Poses X_WB, double margin = 0.0,
+                            std::size_t max_contacts = 4, unsigned flags = 0) {
+        return many_contacts(pairs_of(X_WA, X_WB), max_contacts, [&](auto... out) {
+            return collide_contacts_batch(get(), A.get(), B.get(), X_WA, X_WB, margin, max_contacts, flags, out...);
+        });
+    }
+    Contacts contacts_each(const ShapeSet &set, Span<const std::int64_t> which, Poses X_WA, Poses X_WB, double margin = 0.0,
+                           std::size_t max_contacts = 4, unsigned flags = 0) {
+        std::size_t n = rows(which, 2);
+        return many_contacts(n, max_contacts, [&](auto... out) {
+            return collide_contacts_each(get(), set.get(), which.data(), n, X_WA, X_WB, margin, max_contacts, flags, out...);
+        });
+    }
+
+private:
+    template <class Function, class A, class B>
+    bool boolean(Function ask, const A &a, const B &b, const Pose &X_WA, const Pose &X_WB, unsigned flags) {
+        int hit = 0;
+        require(ask(get(), a.get(), b.get(), X_WA.data(), X_WB.data(), flags, &hit));
+        return hit != 0;
+    }
+    template <class Function, class A, class B, class... Rest>
+    collide_pair row(Function ask, const A &a, const B &b, const Pose &X_WA, const Pose &X_WB, Rest... rest) {
+        collide_pair pair;
+        require(ask(get(), a.get(), b.get(), X_WA.data(), X_WB.data(), rest..., &pair));
+        return pair;
+    }
+    static double *checked(Span<double> axes, std::size_t pairs) {
+        if (!axes.empty() && axes.size() != 3 * pairs) throw Error(COLLIDE_INVALID_ARGUMENT);
+        return axes.data();
+    }
+    template <class Ask>
+    static Contacts many_contacts(std::size_t pairs, std::size_t max_contacts, Ask ask) {
+        if (max_contacts == 0 || pairs > none / sizeof(collide_contact) / max_contacts) throw Error(COLLIDE_INVALID_ARGUMENT);
+        std::vector<std::size_t> starts(pairs + 1);
+        auto rows = answers<collide_contact>(pairs * max_contacts, [&](collide_contact *rows, std::size_t *failed) {
+            return ask(rows, pairs * max_contacts, starts.data(), failed);
+        });
+        rows.resize(starts[pairs]);
+        return {std::move(rows), std::move(starts)};
+    }
+};
+
+} // namespace collide
+
+#endif

@@ -1,0 +1,307 @@
+"""collide.hpp: every class asked by a program in C++, its answers Python's bit by bit; errors, owners, Eigen."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import collide
+from collide.contact.contact_rows import CONTACT_DTYPE
+from collide.kernels import mode
+
+if mode.MODE != mode.COMPILED:
+    pytest.skip(f"kernels are not those of the library: {mode.WHY}", allow_module_level=True)
+
+FLAGS = ["-std=c++17", "-O1", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-pedantic"]
+EIGEN = next((folder for folder in ("/usr/include/eigen3", "/usr/local/include/eigen3") if Path(folder).is_dir()), None)
+#: Memory freed twice, used after or not freed ends a program with a report.
+ADDRESSES = ["-fsanitize=address,undefined", "-fno-sanitize-recover=undefined"]
+
+
+def _built(folder: Path, text: str, *options: str) -> Path:
+    tool = next((name for name in ("c++", "g++", "clang++") if shutil.which(name)), None)
+    if tool is None:
+        pytest.skip("no compiler of C++")
+    (folder / "program.cpp").write_text(text, encoding="utf-8")
+    library = Path(collide.get_library())
+    command = [
+        tool, *FLAGS, *options, f"-I{collide.get_include()}", "program.cpp", library, f"-Wl,-rpath,{library.parent}",
+        "-o", "program",
+    ]
+    done = subprocess.run([*map(str, command)], cwd=folder, capture_output=True, text=True, check=False, timeout=300)
+    if "cannot find" in done.stderr and "san" in done.stderr:
+        pytest.skip(f"no sanitizers: {done.stderr.splitlines()[-1]}")
+    assert done.returncode == 0, done.stderr
+    return folder / "program"
+
+
+def _run(program: Path) -> bytes:
+    done = subprocess.run([program], cwd=program.parent, env={}, capture_output=True, check=False, timeout=300)
+    assert done.returncode == 0, done.stderr.decode()
+    return done.stdout
+
+
+_ANSWERS = r"""
+#include <collide.hpp>
+#include <cstdio>
+using namespace collide;
+
+template <class Rows> void put(const Rows &rows) { std::fwrite(rows.data(), sizeof *rows.data(), rows.size(), stdout); }
+void put(const collide_pair &row) { std::fwrite(&row, sizeof row, 1, stdout); }
+
+int main() {
+    Workspace space;
+    std::vector<Shape> shapes;
+    shapes.push_back(Shape::sphere(0.3));
+    shapes.push_back(Shape::box({0.4, 0.5, 0.6}));
+    shapes.push_back(Shape::capsule(0.1, 0.7));
+    shapes.push_back(Shape::cylinder(0.2, 0.5));
+    shapes.push_back(Shape::cone(0.3, 0.6));
+    shapes.push_back(Shape::ellipsoid({0.2, 0.3, 0.4}));
+    shapes.push_back(Shape::halfspace({0.0, 0.6, 0.8}, -0.1));
+    const double corners[] = {0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 0.5};
+    shapes.push_back(Shape::hull(corners, 0.05));
+    const std::vector<double> normals = {1, 0, 0, -1, 0, 0, 0, 1, 0, 0, -1, 0, 0, 0, 1, 0, 0, -1}, offsets(6, 0.25);
+    shapes.push_back(Shape::hpolytope(normals, offsets));
+    const Pose here, there(std::array<double, 16>{0.8, -0.6, 0, 0.3, 0.6, 0.8, 0, 0.45, 0, 0, 1, 0.25, 0, 0, 0, 1});
+
+    std::vector<std::uint8_t> hits;
+    for (const Shape &shape : shapes) {
+        hits.push_back(space.collides(shapes[1], shape, here, there));
+        put(space.distance(shapes[1], shape, here, there));
+        put(space.distance(shapes[1], shape, here, there, 0.01, COLLIDE_UNSIGNED));
+    }
+    put(hits);
+
+    std::vector<Pose> fall(5);
+    for (std::size_t k = 0; k < fall.size(); ++k) fall[k] = Pose::at(0.0, 0.0, 0.45 + 0.05 * double(k));
+    put(space.collides_batch(shapes[0], shapes[1], here, fall));
+    put(space.distance_batch(shapes[0], shapes[1], here, fall));
+    ShapeSet set(shapes);
+    const std::vector<std::int64_t> which = {0, 1, 1, 2, 2, 3, 3, 4, 4, 7};
+    put(space.collides_each(set, which, fall, here));
+    put(space.distance_each(set, which, fall, here));
+    put(space.contacts(shapes[1], shapes[8], here, Pose::at(0.1, 0.0, 0.54), 0.01, 8));
+    Contacts contacts = space.contacts_batch(shapes[1], shapes[8], here, fall, 0.06, 4);
+    put(contacts.rows);
+    if (contacts.of(1).size() != 4 || contacts.of(4).size() != 0) return 2;
+    put(space.contacts_each(set, which, fall, here, 0.06, 4).rows);
+
+    const std::array<double, 12> vertices = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+    const std::int32_t faces[] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
+    Mesh mesh(vertices, faces), block(shapes[1]);
+    for (const Pose &pose : {there, fall[0]}) put(std::array<std::uint8_t, 1>{space.collides(mesh, block, here, pose)});
+    put(space.distance(mesh, block, here, Pose::at(0.0, 0.0, 2.0)));
+
+    std::vector<double> points;
+    for (int k = 0; k < 300; ++k)
+        for (int axis = 0; axis < 3; ++axis) points.push_back(k / (axis == 0 ? 1 : axis == 1 ? 7 : 49) % 7 * 0.1);
+    Field cloud = Field::point_cloud(points, 0.02);
+    put(std::array<std::uint8_t, 1>{space.collides(cloud, shapes[2], here, Pose::at(0.0, 0.0, 1.2))});
+    put(space.distance(cloud, shapes[2], here, Pose::at(0.0, 0.3, 1.3)));
+    put(space.collides_batch(cloud, shapes[2], here, fall));
+    put(space.distance_batch(cloud, shapes[2], here, fall).pairs);
+    Field::Nearest nearest = cloud.nearest(points, 2);
+    put(nearest.distances);
+    put(nearest.rows);
+    put(cloud.within({0.2, 0.2, 0.2}, 0.15));
+    std::vector<std::uint8_t> cells(24, 0);
+    cells[3] = cells[17] = 1;
+    Field grid = Field::voxel_grid(cells, {2, 3, 4}, {0.1, 0.1, 0.1}, {1.0, 0.0, 0.0});
+    put(space.distance(grid, shapes[0], here, here));
+}
+"""
+
+
+def test_every_class_has_pythons_bits(tmp_path):
+    told = _run(_built(tmp_path, _ANSWERS))
+    shapes = [
+        collide.Sphere(0.3), collide.Box(0.4, 0.5, 0.6), collide.Capsule(0.1, 0.7), collide.Cylinder(0.2, 0.5),
+        collide.Cone(0.3, 0.6), collide.Ellipsoid([0.2, 0.3, 0.4]), collide.Halfspace([0.0, 0.6, 0.8], -0.1),
+        collide.ConvexHull([[0, 0, 0], [0.5, 0, 0], [0, 0.5, 0], [0, 0, 0.5]], radius=0.05),
+        collide.HPolytope(np.kron(np.eye(3), [[1], [-1]]), np.full(6, 0.25)),
+    ]
+    there, here = np.eye(4), np.eye(4)
+    there[:3] = [[0.8, -0.6, 0, 0.3], [0.6, 0.8, 0, 0.45], [0, 0, 1, 0.25]]
+    fall = np.array([_at(0, 0, 0.45 + 0.05 * k) for k in range(5)])
+    place = 0
+
+    def reads(wanted: np.ndarray, what: str) -> None:
+        nonlocal place
+        wanted = np.ascontiguousarray(wanted)
+        read = np.frombuffer(told[place : place + wanted.nbytes], dtype=wanted.dtype)
+        assert read.tobytes() == wanted.tobytes(), f"{what}: {read}, {wanted}"
+        place += wanted.nbytes
+
+    box = shapes[1]
+    for shape in shapes:
+        reads(collide.distance(box, shape, here, there).rows, f"distance of {shape}")
+        reads(collide.distance(box, shape, here, there, max_distance=0.01, signed=False).rows, f"limit of {shape}")
+    hits = np.array([collide.collide(box, shape, here, there) for shape in shapes])
+    assert 0 < hits.sum() < len(hits)
+    reads(hits.astype(np.uint8), "booleans")
+    sphere, cube = shapes[0], shapes[8]
+    reads(collide.collide(sphere, box, here, fall).astype(np.uint8), "batch of booleans")
+    reads(collide.distance(sphere, box, here, fall).rows, "batch of distances")
+    some = [(0, 1), (1, 2), (2, 3), (3, 4), (4, 7)]
+    each = [(shapes[a], shapes[b], fall[k], here) for k, (a, b) in enumerate(some)]
+    reads(np.array([collide.collide(*asked) for asked in each]).astype(np.uint8), "booleans of a set")
+    reads(np.concatenate([collide.distance(*asked).rows for asked in each]), "distances of a set")
+    reads(collide.contacts(box, cube, here, _at(0.1, 0, 0.54), margin=0.01, max_contacts=8).rows, "contacts")
+    reads(_contacts([(box, cube, here, X) for X in fall]), "batch of contacts")
+    reads(_contacts(each), "contacts of a set")
+    mesh = collide.Mesh(np.vstack([np.zeros(3), np.eye(3)]), [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    met = [collide.collide(mesh, box, here, X) for X in (there, fall[0])]
+    reads(np.array(met, dtype=np.uint8), "booleans of meshes")
+    reads(collide.distance(mesh, box, here, _at(0, 0, 2)).rows, "distance of meshes")
+    number, capsule = np.arange(300), shapes[2]
+    points = np.stack([number % 7, number // 7 % 7, number // 49 % 7], axis=1) * 0.1
+    cloud = collide.PointCloud(points, 0.02)
+    reads(np.array([collide.collide(cloud, capsule, here, _at(0, 0, 1.2))], dtype=np.uint8), "boolean of a cloud")
+    reads(collide.distance(cloud, capsule, here, _at(0, 0.3, 1.3), signed=False).rows, "distance of a cloud")
+    reads(collide.collide(cloud, capsule, here, fall).astype(np.uint8), "booleans of a cloud")
+    reads(collide.distance(cloud, capsule, here, fall, signed=False).rows, "distances of a cloud")
+    nearest = cloud.nearest(points, k=2)
+    reads(nearest.distance, "nearest points")
+    reads(nearest.row, "numbers of nearest points")
+    reads(np.asarray(cloud.within([0.2, 0.2, 0.2], 0.15), dtype=np.int64), "points within")
+    cells = np.zeros(24, dtype=bool)
+    cells[[3, 17]] = True
+    grid = collide.VoxelGrid(cells.reshape(2, 3, 4), 0.1, _at(1, 0, 0))
+    reads(collide.distance(grid, sphere, here, here, signed=False).rows, "distance of a grid")
+    assert place == len(told)
+
+
+def _at(*xyz: float) -> np.ndarray:
+    X = np.eye(4)
+    X[:3, 3] = xyz
+    return X
+
+
+def _contacts(asked: list) -> np.ndarray:
+    rows = [collide.contacts(*pair, margin=0.06, max_contacts=4).rows for pair in asked]
+    assert sum(map(len, rows)) > 4 and rows[0].dtype == CONTACT_DTYPE
+    return np.concatenate(rows)
+
+
+_OWNERS = r"""
+#include <collide.hpp>
+#include <cstdio>
+#include <cstring>
+using namespace collide;
+
+template <class Function> collide_status status_of(Function ask) {
+    try {
+        ask();
+    } catch (const Error &error) {
+        if (std::strstr(error.what(), collide_status_text(error.status())) == nullptr) return COLLIDE_OK;
+        return error.status();
+    }
+    return COLLIDE_OK;
+}
+#define EXPECT(condition) \
+    if (!(condition)) return std::fprintf(stderr, "line %d: %s\n", __LINE__, #condition), 1
+
+int main() {
+    static_assert(!std::is_copy_constructible_v<Shape> && std::is_nothrow_move_constructible_v<Shape>);
+    static_assert(!std::is_copy_constructible_v<Workspace> && std::is_nothrow_move_assignable_v<Mesh>);
+    static_assert(!std::is_convertible_v<std::vector<double>, Span<int>>, "a span is of its elements");
+    Workspace space;
+    Shape ball = Shape::sphere(1.0), moved = std::move(ball);
+    EXPECT(!ball && moved);
+    ball = Shape::sphere(2.0);  // a new one in an empty place, then another over it
+    ball = std::move(moved);
+    EXPECT(ball && !moved);
+    const Pose X, off = Pose::at(0.0, 0.0, 1.5);
+    EXPECT(space.collides(ball, ball, X, off));
+    EXPECT(status_of([&] { space.collides(ball, moved, X, X); }) == COLLIDE_INVALID_ARGUMENT);
+    EXPECT(status_of([] { Shape::sphere(-1.0); }) == COLLIDE_INVALID_SHAPE);
+    EXPECT(status_of([] { Shape::hull(std::vector<double>(4)); }) == COLLIDE_INVALID_ARGUMENT);
+    EXPECT(status_of([] { Shape::hull(Span<const double>()); }) == COLLIDE_INVALID_ARGUMENT);
+    const std::vector<double> one(1), six(6);
+    EXPECT(status_of([&] { Shape::hpolytope(six, one); }) == COLLIDE_INVALID_ARGUMENT);
+    EXPECT(status_of([] { ShapeSet empty{Span<const Shape>()}; }) == COLLIDE_INVALID_ARGUMENT);
+    EXPECT(status_of([&] { space.collides(ball, ball, X, std::array<double, 16>{}); }) == COLLIDE_INVALID_POSE);
+    Shape floor = Shape::halfspace({0.0, 0.0, 1.0}, 0.0);
+    EXPECT(status_of([&] { space.distance(floor, floor, X, X); }) == COLLIDE_ENDLESS_DEPTH);
+    EXPECT(space.collides(floor, floor, X, X));
+    EXPECT(status_of([&] { Mesh made(floor); }) == COLLIDE_UNSUPPORTED);
+    std::vector<std::uint8_t> cells(5, 1);
+    EXPECT(status_of([&] { Field::voxel_grid(cells, {2, 1, 2}, {1.0, 1.0, 1.0}); }) == COLLIDE_INVALID_ARGUMENT);
+    const std::size_t huge = std::size_t(1) << 32;
+    EXPECT(status_of([&] { Field::voxel_grid({}, {huge, huge, 1}, {1.0, 1.0, 1.0}); }) == COLLIDE_INVALID_ARGUMENT);
+    EXPECT(status_of([&] { Field::voxel_grid(cells, {huge, huge, 5}, {1.0, 1.0, 1.0}); }) == COLLIDE_INVALID_ARGUMENT);
+    Field cloud = Field::point_cloud(std::array<double, 3>{}, 0.1);
+    EXPECT(cloud.within({5.0, 0.0, 0.0}, 1.0).empty() && cloud.within({0.5, 0.0, 0.0}, 1.0).size() == 1);
+    EXPECT(cloud.nearest(std::array<double, 3>{}, 2).rows[1] == -1);
+
+    std::vector<Pose> poses(3);
+    poses[2].m[0] = 2.0;
+    try {
+        space.distance_batch(ball, ball, poses, X);
+        return 1;
+    } catch (const Error &error) {
+        EXPECT(error.status() == COLLIDE_INVALID_POSE && error.index() == 2);
+        EXPECT(std::string(error.what()).find("pair 2") != std::string::npos);
+    }
+    std::vector<double> axes(8);
+    EXPECT(status_of([&] { space.collides_batch(ball, ball, X, off, 0, axes); }) == COLLIDE_INVALID_ARGUMENT);
+    axes.assign(3, 0.0);
+    EXPECT(space.collides_batch(ball, ball, X, Pose::at(5.0, 0.0, 0.0), 0, axes)[0] == 0 && axes[0] != 0.0);
+    EXPECT(space.collides_batch(ball, ball, Poses(), X).empty());
+    // Balls that nearly meet others: rows without an answer stand beside answers.
+    std::vector<Pose> deep(2);
+    deep[1] = Pose::at(3.0, 0.0, 0.0);
+    const std::vector<double> two = {0.0, 0.0, 0.0, 0.05, 0.0, 0.0};
+    PairsOfField rows = space.distance_batch(Field::point_cloud(two, 0.1), ball, X, deep, infinity, 0);
+    EXPECT(rows.statuses[0] == COLLIDE_UNSUPPORTED && rows.statuses[1] == COLLIDE_OK && rows.pairs[1].distance > 1.8);
+    return 0;
+}
+"""
+
+
+@pytest.mark.parametrize("options", [[], ADDRESSES], ids=["plain", "sanitized"])
+def test_owners_and_errors(tmp_path, options):
+    _run(_built(tmp_path, _OWNERS, *options))
+
+
+_EIGEN = r"""
+#include <collide.hpp>
+#ifndef COLLIDE_WITH_EIGEN
+#error Eigen is on the path
+#endif
+int main() {
+    Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
+    X.translate(Eigen::Vector3d(2.0, 0.0, 0.0)).rotate(Eigen::AngleAxisd(0.5, Eigen::Vector3d(1.0, 2.0, 2.0) / 3.0));
+    Eigen::Matrix<double, 4, 4, Eigen::RowMajor> by_rows = X.matrix();
+    collide::Pose a(X), b(X.matrix()), c(by_rows), d(Eigen::AffineCompact3d(X.matrix().topRows<3>()));
+    if (a.m != b.m || a.m != c.m || a.m != d.m || a(0, 3) != 2.0 || a(1, 0) != X(1, 0) || a(1, 0) == X(0, 1)) return 1;
+    collide::Workspace space;
+    collide_pair pair = space.distance(collide::Shape::sphere(0.5), collide::Shape::sphere(0.25), collide::Pose(), X);
+    return (collide::vector(pair.normal) - Eigen::Vector3d::UnitX()).norm() < 1e-15 && pair.distance == 1.25 ? 0 : 2;
+}
+"""
+
+
+def test_poses_are_made_of_eigens(tmp_path):
+    if EIGEN is None:
+        pytest.skip("no Eigen on this machine: apt-get install libeigen3-dev")
+    _run(_built(tmp_path, _EIGEN, "-isystem", EIGEN))
+
+
+def test_without_eigen_no_word_of_it_is_read(tmp_path):
+    text = "#include <collide.hpp>\n#ifdef COLLIDE_WITH_EIGEN\n#error read\n#endif\nint main() {}\n"
+    _run(_built(tmp_path, text, "-DCOLLIDE_WITHOUT_EIGEN", *([] if EIGEN is None else ["-isystem", EIGEN])))
+
+
+
+def test_the_page_says_what_runs(tmp_path):
+    page = (Path(__file__).resolve().parents[2] / "docs" / "c-interface.md").read_text(encoding="utf-8")
+    (snippet,) = re.findall(r"```cpp\n(.*?)```", page, re.DOTALL)
+    ending = "return pairs.size() == 100 && pairs[0].distance == 0.5 && pairs[99].hit ? 0 : 1;"
+    _run(_built(tmp_path, f"#include <collide.hpp>\nint main() {{\n{snippet}{ending}\n}}\n"))
