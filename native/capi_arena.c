@@ -35,6 +35,14 @@ void *arena_take(struct arena *arena, size_t bytes)
     return taken;
 }
 
+void *arena_zeroed(struct arena *arena, size_t count, size_t bytes)
+{
+    void *taken;
+    if (count > ((size_t)-1 >> 1) / bytes) arena->failed = 1;
+    if ((taken = arena_take(arena, count * bytes)) != NULL) memset(taken, 0, count * bytes);
+    return taken;
+}
+
 void arena_end(struct arena *arena)
 {
     while (arena->chunks != NULL) {

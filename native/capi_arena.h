@@ -13,6 +13,8 @@ struct arena {
 
 void arena_begin(struct arena *arena);
 void *arena_take(struct arena *arena, size_t bytes);
+/* Zeros for `count` things; NULL where there is no memory for them. */
+void *arena_zeroed(struct arena *arena, size_t count, size_t bytes);
 void arena_end(struct arena *arena);
 
 #endif

@@ -107,6 +107,10 @@ struct collide_shape_set {
     size_t count;
 };
 
+/* capi_shapes.c: the convex set of a row of a table: a kind, NUMBERS doubles, n points. */
+collide_status shape_of_row(int64_t kind, const double *numbers, const double *points, size_t n, int may_have_tree,
+                            collide_shape **shape);
+
 /* capi_tree.c: a support tree of n points (n, 3), which are kept; *tree stays NULL where the hull is too small for
    one. */
 collide_status build_tree(const struct collide_kernels *kernels, const double *points, size_t n, void **tree);

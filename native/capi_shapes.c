@@ -236,6 +236,36 @@ collide_status collide_hull(const double *points, size_t n, double radius, colli
     return shape_of_points(points, n, radius == 0.0 ? 0.0 : radius, 0.0, 1, shape);
 }
 
+/* Whether numbers make a curved set, or a half-space, of this kind. */
+static int are_params(int64_t kind, const double *params)
+{
+    int k, n = kind == ELLIPSOID ? 3 : 2;
+    if (kind == HALFSPACE) {
+        double length = sqrt(params[0] * params[0] + params[1] * params[1] + params[2] * params[2]);
+        return length >= 1e-6 && length <= 1e6 && is_coordinate(params[3]);
+    }
+    for (k = 0; k < n; k++) if (!is_length(params[k])) return 0;
+    return kind == CYLINDER || kind == CONE || kind == ELLIPSOID;
+}
+
+collide_status shape_of_row(int64_t kind, const double *numbers, const double *points, size_t n, int may_have_tree,
+                            collide_shape **shape)
+{
+    collide_status status = COLLIDE_INVALID_SHAPE;
+    int k, is_good = 1;
+    rounding given = round_as_kernels_do();
+    *shape = NULL;
+    for (k = 0; k < NUMBERS; k++) is_good = is_good && is_coordinate(numbers[k]) && (k >= PARAMS || numbers[k] >= 0.0);
+    if (kind == POINTS) is_good = is_good && n > 0 && n < (size_t)1 << 26 && are_points(points, n);
+    else is_good = is_good && n == 0 && are_params(kind, numbers + PARAMS);
+    round_as_before(given);
+    if (!is_good) return status;
+    if (kind == POINTS) status = shape_of_points(points, n, numbers[RADIUS], numbers[SLOP], may_have_tree, shape);
+    else status = shape_of_numbers((int)kind, numbers + PARAMS, NUMBERS - PARAMS, numbers[REACH], shape);
+    for (k = 0; status == COLLIDE_OK && k < NUMBERS; k++) if (k != REACH) (*shape)->numbers[k] = numbers[k];
+    return status;
+}
+
 /* The corners of m half-spaces, by collide/hull/double_description.py, in memory that grows with the rays it takes. */
 static collide_status shape_of_halfspaces(const double *normals, const double *offsets, int64_t m, collide_shape **shape)
 {

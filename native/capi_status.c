@@ -19,6 +19,7 @@ const char *collide_status_text(collide_status status)
     case COLLIDE_UNSUPPORTED: return "not supported by the C interface";
     case COLLIDE_NO_KERNELS: return "no kernels for this processor, or COLLIDE_CPU names a level that is not to be had";
     case COLLIDE_TOO_MANY: return "more answers than there is room for";
+    case COLLIDE_INVALID_FILE: return "no such file, no file of this version, or a damaged one";
     }
     return "unknown status";
 }

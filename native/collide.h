@@ -11,14 +11,14 @@
    Errors. Every function that can fail returns a collide_status and, unless that is COLLIDE_OK, leaves the objects that it
    was to make NULL. Nothing prints, nothing ends the process, nothing jumps.
 
-   Memory. Shapes, sets of shapes, unions, meshes, fields, worlds and workspaces are made by functions of this header and freed by
-   the caller with collide_..._free, which take NULL. Numbers handed in are copied. Queries allocate nothing, but for contacts: the
+   Memory. Shapes, sets of shapes, unions, meshes, fields, worlds, robots and workspaces are made by functions of this header and
+   freed by the caller with collide_..._free, which take NULL. Numbers handed in are copied. Queries allocate nothing, but for contacts: the
    first ones of a hull work out its faces, which are kept with it, and the first ones of a workspace what manifolds are made in;
    but for the first casts, motions and unions of a workspace, which make its room for them, and each new pair of unions; but for
    fields, where a walk leaves a pair open: then a list of the items nearby; and but for worlds, whose lists of pairs are kept with
    the workspace, and grow.
 
-   Threads. A shape, a set, a union, a mesh or a field never changes: any number of threads may use one at once. A workspace is for
+   Threads. A shape, a set, a union, a mesh, a field or a robot never changes: any number of threads may use one at once. A workspace is for
    one thread at a time: give each thread its own. A world may be asked by many at once while nobody changes it. Nothing else is
    shared. The answers do not depend on the caller's rounding mode, nor on whether it flushes small numbers to 0: both are set for
    the length of a call, and put back.
@@ -60,7 +60,8 @@ typedef enum collide_status {
     COLLIDE_ENDLESS_DEPTH = 6,    /* two half-spaces overlap without end: there is no depth; the boolean has an answer */
     COLLIDE_UNSUPPORTED = 7,      /* Python answers this, this interface does not */
     COLLIDE_NO_KERNELS = 8,       /* the processor is too old, or COLLIDE_CPU names a level that is not to be had */
-    COLLIDE_TOO_MANY = 9           /* more contacts, or points, than the caller has room for */
+    COLLIDE_TOO_MANY = 9,          /* more contacts, points or pairs than the caller has room for */
+    COLLIDE_INVALID_FILE = 10      /* no such file, no file of this version, or a damaged one */
 } collide_status;
 
 /* A sentence about a status, in English; of an unknown one, too. Never NULL. */
@@ -656,6 +657,82 @@ COLLIDE_API collide_status collide_world_raycast(const collide_world *world, col
 COLLIDE_API collide_status collide_world_nearest(const collide_world *world, collide_workspace *workspace, const double *points_W,
                                                  size_t n, double max_distance, const uint32_t *group, const uint32_t *mask,
                                                  collide_world_hit *hits);
+
+/* --- robots ---------------------------------------------------------------------------------------------------------
+
+   A robot among obstacles, from a file that `collide.RobotChecker.save` wrote in Python: links, attached objects, padding, untested
+   pairs, and bodies around where they stood. Configurations are rows of collide_robot_columns doubles [rad or m], as in Python, one
+   behind another. The answers are the checker's, bit by bit. COLLIDE_UNSUPPORTED, never a guess: what kernels leave to Python,
+   bodies near meshes that are not convex, and what touches within rounding. `statuses` : NULL, or room for n: which are left so;
+   the others are answered, *failed, unless failed is NULL, is the first of those left, and its status is returned. */
+typedef struct collide_robot collide_robot;
+
+/* A robot from a file, or from its n bytes in memory, which are copied. Whatever stands in them is checked, so that a file may come
+   from anywhere: COLLIDE_INVALID_FILE. A digest tells damage; a file made to lie is not told from one that Python wrote. */
+COLLIDE_API collide_status collide_robot_load(const char *path, collide_robot **robot);
+COLLIDE_API collide_status collide_robot_read(const void *bytes, size_t n, collide_robot **robot);
+
+/* Frees a robot that no workspace uses any more; NULL is fine. A robot never changes and any number of threads may use it. */
+COLLIDE_API void collide_robot_free(collide_robot *robot);
+
+/* How many columns a configuration has, bodies the robot, and bodies there are around. */
+COLLIDE_API size_t collide_robot_columns(const collide_robot *robot);
+COLLIDE_API size_t collide_robot_bodies(const collide_robot *robot);
+COLLIDE_API size_t collide_robot_around(const collide_robot *robot);
+
+/* Names in UTF-8, which go with the robot: of a column; of a body by its number in rows, -1 - k for body k around. NULL out of
+   range. */
+COLLIDE_API const char *collide_robot_column_name(const collide_robot *robot, size_t column);
+COLLIDE_API const char *collide_robot_body_name(const collide_robot *robot, int32_t body);
+
+/* Scratch memory of questions about one robot, one a thread; made where a planner starts, not at every question. */
+typedef struct collide_robot_workspace collide_robot_workspace;
+
+COLLIDE_API collide_status collide_robot_workspace_create(const collide_robot *robot, collide_robot_workspace **workspace);
+COLLIDE_API void collide_robot_workspace_free(collide_robot_workspace *workspace);
+
+/* Whether each of n configurations collides: hits[k]. A few microseconds each, fastest eight and more at a time. */
+COLLIDE_API collide_status collide_robot_collide(collide_robot_workspace *workspace, const double *configurations, size_t n,
+                                                 uint8_t *hits, collide_status *statuses, size_t *failed);
+
+/* Pairs between which bodies distances are asked, to be joined by |. */
+enum { COLLIDE_WITH_AROUND = 1, COLLIDE_AMONG_ROBOT = 2 };
+
+/* The nearest pair of each of n configurations, or the deepest where some overlap. max_distance : >= 0, or infinite. In a row a is a
+   body of the robot, b another or -1 - k for body k around, part_a and part_b numbers of convex parts; where no tested pair is
+   within max_distance a is -1, beyond 1, lower max_distance and upper infinite. gradients : NULL, or a row of columns for each:
+   derivatives of the distance [m/rad or m/m], NaN where there is none, as at 0. */
+COLLIDE_API collide_status collide_robot_distance(collide_robot_workspace *workspace, const double *configurations, size_t n,
+                                                  double max_distance, unsigned between, collide_pair *pairs,
+                                                  double *gradients, collide_status *statuses, size_t *failed);
+
+/* All pairs of bodies within max_distance, the nearest parts of each: those of configuration k are starts[k] to starts[k + 1] - 1,
+   sorted by bodies, those around last; of configurations left to Python there are none. pairs, and gradients unless NULL: room for
+   `capacity` rows. starts : room for n + 1. COLLIDE_TOO_MANY: go on from configuration *failed with more room; what is before it is
+   good. */
+COLLIDE_API collide_status collide_robot_near(collide_robot_workspace *workspace, const double *configurations, size_t n,
+                                              double max_distance, unsigned between, collide_pair *pairs,
+                                              double *gradients, size_t capacity, size_t *starts,
+                                              collide_status *statuses, size_t *failed);
+
+enum {
+    COLLIDE_MOTION_OPEN = 0,    /* neither proven free nor found to collide, at the resolution asked */
+    COLLIDE_MOTION_FREE = 1,    /* proven: at no time do tested pairs meet */
+    COLLIDE_MOTION_COLLIDES = 2 /* at times[k] */
+};
+
+/* Verdicts on n straight motions q(t) = first + t (last - first), 0 <= t <= 1, of rows of `first` and `last`: proven, not sampled.
+   resolution > 0 : intervals in which no column changes by more are not halved any more [rad or m]. times : NULL, or room for n: a
+   time of a collision, not always the first; NaN of others. */
+COLLIDE_API collide_status collide_robot_certify(collide_robot_workspace *workspace, const double *first, const double *last,
+                                                 size_t n, double resolution, uint8_t *verdicts, double *times,
+                                                 collide_status *statuses, size_t *failed);
+
+/* Whether n straight motions collide at samples: both ends, the middle, quarters, until no column changes by more than `resolution`
+   from one to the next. What is between two samples is not looked at. hits, times : as above. */
+COLLIDE_API collide_status collide_robot_sample(collide_robot_workspace *workspace, const double *first, const double *last,
+                                                size_t n, double resolution, uint8_t *hits, double *times,
+                                                collide_status *statuses, size_t *failed);
 
 #ifdef __cplusplus
 }

@@ -93,7 +93,7 @@ private:
 // How many rows of `width` numbers there are. Throws where numbers are left over.
 template <class T>
 std::size_t rows(Span<T> numbers, std::size_t width) {
-    if (numbers.size() % width != 0) throw Error(COLLIDE_INVALID_ARGUMENT);
+    if (width == 0 || numbers.size() % width != 0) throw Error(COLLIDE_INVALID_ARGUMENT);
     return numbers.size() / width;
 }
 
@@ -285,11 +285,24 @@ struct Contacts {
     }
 };
 
-// Rows of which some may be without an answer: where statuses[k] is not COLLIDE_OK row k is zeros.
-struct PairsOfField {
-    std::vector<collide_pair> pairs;
+// Rows of which some may be without an answer: where statuses[k] is not COLLIDE_OK row k tells nothing.
+template <class Row>
+struct Answered {
+    std::vector<Row> rows;
     std::vector<collide_status> statuses;
 };
+
+// n of these. Throws where nothing is answered at all.
+template <class Row, class Ask>
+Answered<Row> answered(std::size_t n, Ask ask) {
+    std::vector<collide_status> statuses(n);
+    auto rows = answers<Row>(n, [&](Row *rows, std::size_t *failed) {
+        collide_status status = ask(rows, statuses.data(), failed);
+        bool is_of_a_row = status == COLLIDE_UNSUPPORTED || status == COLLIDE_OUT_OF_RANGE || status == COLLIDE_ENDLESS_DEPTH;
+        return is_of_a_row ? COLLIDE_OK : status;
+    });
+    return {std::move(rows), std::move(statuses)};
+}
 
 // Scratch memory, one a thread, and the questions asked with it. `collides` is collide_collide of whatever kind of body.
 // which : two numbers of a set's shapes a pair.   axes : none, or 3 doubles a pair, read and written.
@@ -346,17 +359,11 @@ public:
             return collide_distance_batch(get(), A.get(), B.get(), X_WA, X_WB, max_distance, flags, pairs, failed);
         });
     }
-    PairsOfField distance_batch(const Field &field, const Shape &shape, Poses X_WF, Poses X_WS, double max_distance = infinity,
-                                unsigned flags = COLLIDE_UNSIGNED) {
-        std::size_t n = pairs_of(X_WF, X_WS);
-        std::vector<collide_status> statuses(n);
-        auto pairs = answers<collide_pair>(n, [&](collide_pair *pairs, std::size_t *failed) {
-            collide_status status = collide_field_distance_batch(get(), field.get(), shape.get(), X_WF, X_WS, max_distance, flags,
-                                                                 pairs, statuses.data(), failed);
-            bool is_of_a_row = status == COLLIDE_UNSUPPORTED || status == COLLIDE_OUT_OF_RANGE || status == COLLIDE_ENDLESS_DEPTH;
-            return is_of_a_row ? COLLIDE_OK : status;
+    Answered<collide_pair> distance_batch(const Field &field, const Shape &shape, Poses X_WF, Poses X_WS,
+                                          double max_distance = infinity, unsigned flags = COLLIDE_UNSIGNED) {
+        return answered<collide_pair>(pairs_of(X_WF, X_WS), [&](auto... out) {
+            return collide_field_distance_batch(get(), field.get(), shape.get(), X_WF, X_WS, max_distance, flags, out...);
         });
-        return {std::move(pairs), std::move(statuses)};
     }
     std::vector<collide_pair> distance_each(const ShapeSet &set, Span<const std::int64_t> which, Poses X_WA, Poses X_WB,
                                             double max_distance = infinity, unsigned flags = 0) {
@@ -416,6 +423,81 @@ private:
         rows.resize(starts[pairs]);
         return {std::move(rows), std::move(starts)};
     }
+};
+
+// --- robots ----------------------------------------------------------------------------------------------------------------
+
+// A robot among obstacles, from a file of Python's collide.RobotChecker.save.
+class Robot : public Owner<collide_robot, collide_robot_free> {
+public:
+    using Owner::Owner;
+    static Robot load(const std::string &path) { return Robot(made(collide_robot_load, path.c_str())); }
+    static Robot read(Span<const std::uint8_t> bytes) { return Robot(made(collide_robot_read, bytes.data(), bytes.size())); }
+    std::size_t columns() const { return collide_robot_columns(get()); }
+    std::string column_name(std::size_t column) const { return text(collide_robot_column_name(get(), column)); }
+    // Of a body by its number in rows: -1 - k of body k around.
+    std::string body_name(std::int32_t body) const { return text(collide_robot_body_name(get(), body)); }
+
+private:
+    static std::string text(const char *name) {
+        if (name == nullptr) throw Error(COLLIDE_INVALID_ARGUMENT);
+        return name;
+    }
+};
+
+// Nearest pairs, and their derivatives by the columns, a row each.
+struct RobotDistances : Answered<collide_pair> {
+    std::vector<double> gradients;
+};
+
+// Verdicts COLLIDE_MOTION_..., with times of collisions, NaN of others.
+struct RobotMotions : Answered<std::uint8_t> {
+    std::vector<double> times;
+};
+
+// Scratch memory of questions about a robot, which outlives it; one a thread. Configurations are rows of columns() numbers.
+class RobotWorkspace : public Owner<collide_robot_workspace, collide_robot_workspace_free> {
+public:
+    explicit RobotWorkspace(const Robot &robot)
+        : Owner(made(collide_robot_workspace_create, robot.get())), columns_(robot.columns()) {}
+
+    Answered<std::uint8_t> collides(Span<const double> configurations) {
+        std::size_t n = rows(configurations, columns_);
+        return answered<std::uint8_t>(n, [&](auto... out) {
+            return collide_robot_collide(get(), configurations.data(), n, out...);
+        });
+    }
+    RobotDistances distances(Span<const double> configurations, double max_distance = infinity,
+                             unsigned between = COLLIDE_WITH_AROUND | COLLIDE_AMONG_ROBOT) {
+        std::size_t n = rows(configurations, columns_);
+        std::vector<double> gradients(configurations.size());
+        auto found = answered<collide_pair>(n, [&](collide_pair *pairs, auto... out) {
+            return collide_robot_distance(get(), configurations.data(), n, max_distance, between, pairs, gradients.data(),
+                                          out...);
+        });
+        return {std::move(found), std::move(gradients)};
+    }
+    // Straight motions from row to row, proven free or found to collide.
+    RobotMotions certify(Span<const double> first, Span<const double> last, double resolution = 1e-3) {
+        return motions(collide_robot_certify, first, last, resolution);
+    }
+    // The same at samples: verdicts 1 of collisions, 0 of others.
+    RobotMotions sample(Span<const double> first, Span<const double> last, double resolution = 0.01) {
+        return motions(collide_robot_sample, first, last, resolution);
+    }
+
+private:
+    template <class Function>
+    RobotMotions motions(Function ask, Span<const double> first, Span<const double> last, double resolution) {
+        std::size_t n = rows(first, columns_);
+        if (last.size() != first.size()) throw Error(COLLIDE_INVALID_ARGUMENT);
+        std::vector<double> times(n);
+        auto found = answered<std::uint8_t>(n, [&](std::uint8_t *verdicts, auto... out) {
+            return ask(get(), first.data(), last.data(), n, resolution, verdicts, times.data(), out...);
+        });
+        return {std::move(found), std::move(times)};
+    }
+    std::size_t columns_;
 };
 
 } // namespace collide

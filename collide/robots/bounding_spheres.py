@@ -166,6 +166,25 @@ class SphereWorkspace:
             header[layout.MAP_CELLS_AT] = address_of(maps.cells)
 
 
+    def tables(self, setting: Setting) -> dict[str, np.ndarray]:
+        """Spheres and maps as kernels read them, by name (`checker_file.py`), and their header."""
+        n, maps, made = len(setting.bodies), setting.maps, self.no_tables()
+        if maps is not None:
+            made |= {"map_ints": maps.ints, "map_doubles": maps.doubles, "map_cells": maps.cells}
+        return made | {
+            "header": self.header, "sphere_counts": self.counts[:n], "around_bodies": self.around_bodies[:n],
+            "sphere_rows": self.spheres, "part_kinds": self._buffers[layout.PART_KINDS_AT],
+            "part_numbers": self._buffers[layout.PART_NUMBERS_AT],
+        }
+
+    @staticmethod
+    def no_tables() -> dict[str, np.ndarray]:
+        """Empty tables of the same names."""
+        names = "sphere_counts around_bodies sphere_rows part_kinds part_numbers map_ints map_doubles map_cells"
+        empty = {name: np.zeros(0) for name in names.split()}
+        return {"header": np.zeros(layout.SPHERE_HEADER, dtype=np.int64), **empty}
+
+
 def _parts_around(tables: CheckTables, around: Surroundings) -> tuple[np.ndarray, np.ndarray]:
     """((parts,) kinds, (parts, PART_NUMBERS)) of the parts around."""
     kinds = np.zeros(len(around.packed), dtype=np.int64)

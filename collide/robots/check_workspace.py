@@ -150,6 +150,26 @@ class CheckWorkspace:
             self._carry(setting)
         return True
 
+    def tables(self) -> dict[str, np.ndarray]:
+        """Tables of robot and surroundings as kernels read them, by name (`checker_file.py`)."""
+        setting, buffers, n = self.setting, self._buffers, len(self.setting.bodies)
+        n_link_parts, nodes = int(self.header[layout.N_LINK_PARTS]), int(self.header[layout.N_NODES])
+        return {
+            "bodies": self._bodies[:n], "body_boxes": self._body_boxes[:n], "parts": self._parts,
+            "part_boxes": self._part_boxes, "is_bound": self._is_bound, "shape_of": self._shape_of,
+            "poses": buffers[layout.POSES_AT][n_link_parts:], "body_of": buffers[layout.BODY_OF_AT],
+            "self_pairs": setting.self_pairs, "allowed": setting.allowed,
+            "nodes": buffers[layout.NODES_AT] if nodes else np.zeros(0),
+            "node_links": buffers[layout.NODE_LINKS_AT][:nodes] if nodes else np.zeros(0),
+            "unbounded": buffers[layout.UNBOUNDED_AT],
+        }
+
+    def sphere_tables(self) -> dict[str, np.ndarray]:
+        """Those of `SphereWorkspace.tables`, empty without spheres."""
+        if self._spheres is None:
+            return SphereWorkspace.no_tables()
+        return self._spheres.tables(self.setting)
+
     def motions(self, resolution: float) -> MotionWorkspace:
         """The workspace of `certify_motions`, for this resolution [rad or m]."""
         if self._motions is None:
@@ -245,6 +265,11 @@ class MotionWorkspace:
         self.header[motions.BETWEEN_AT] = address_of(self._between)
         reach = max([self._reach, *(_reach_of(rows.tables.body_boxes[0].tolist()) for rows in setting.objects)])
         self.header[motions.ROUNDING :].view(np.float64)[:] = motions.ROUNDING_SHARE * (reach + self._shifts)
+
+    def tables(self) -> dict[str, np.ndarray]:
+        """Tables of motions as kernels read them, by name (`checker_file.py`), of the bodies of the last setting."""
+        n = len(self._filters.allowed) if self._filters is not None else 0
+        return {"paths": self._paths[:n], "path_lengths": self._lengths[:n], "between": self._between}
 
     def begin(self, resolution: float) -> None:
         """Count anew, of straight motions with this resolution [rad or m]."""

@@ -378,6 +378,10 @@ class CheckerScene:
             if not self._publish(read, _setting=setting, **made):
                 self._n_asked = 0
 
+    def make_spheres(self) -> None:
+        """Make spheres of bodies, and maps, where the robot may have some, now rather than after many questions."""
+        self._count(_PAY_FOR_SPHERES)
+
     def _spheres_with(self, around: Surroundings, objects: Sequence[ObjectRows]) -> SphereTables | None:
         """Spheres of the links, unless an attached object has none."""
         return self._spheres_among(around) if all(rows.spheres is not None for rows in objects) else None

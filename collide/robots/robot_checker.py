@@ -9,11 +9,13 @@ import numpy as np
 
 from collide.base import argument_checks as checks
 from collide.base.threads import check_threads
+from collide.base.whole_file import whole_file
 from collide.errors import InvalidArgument, brief, listing
 from collide.robots.certified_boxes import CertifiedBoxes, certify_boxes
 from collide.robots.certified_edges import CertifiedEdges, certify, sampled_collision
 from collide.robots.certified_motions import CertifiedMotion, certify_pieces, refuse_degrees, shortest_ways
 from collide.robots.check_configurations import COLLIDES, IS_OPEN
+from collide.robots.checker_file import checker_bytes
 from collide.robots.checker_scene import CheckerScene
 from collide.robots.configuration_batches import check_piece
 from collide.robots.configuration_report import ConfigurationReport
@@ -506,6 +508,32 @@ class RobotChecker(CheckerScene):
             wanted = f"one configuration ({self.robot.dof},)"
             raise InvalidArgument(f"RobotChecker.explain: q must be {wanted}, got {q.shape}")
         return ConfigurationReport.of(self._as_of_now(), q[0])
+
+    def save(self, path) -> None:
+        """Write a file from which programs in C answer the same questions, bit by bit: `collide_robot_load`.
+
+        Parameters
+        ----------
+        path : str or PathLike
+            The file, written whole or not at all.
+
+        Raises
+        ------
+        UnsupportedQuery
+            With clouds, grids and large terrain around.
+        OSError
+            Where the file cannot be written.
+
+        Notes
+        -----
+        Of robot, attached objects, untested pairs and World as they stand; docs/c-interface.md says what C answers.
+        Spheres and maps of the links are made first, unless made already: a few tenths of a second. Some hundred
+        kilobytes.
+        """
+        self.make_spheres()
+        made = checker_bytes(self._as_of_now())
+        with whole_file(path) as stream:
+            stream.write(made)
 
     def within_limits(self, Q) -> np.ndarray:
         """Whether configurations keep the joints' limits, those of mimicking joints, too.

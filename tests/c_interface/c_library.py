@@ -21,7 +21,7 @@ from collide.results import PAIR_DTYPE
 OK, NO_MEMORY, INVALID_ARGUMENT, INVALID_SHAPE, INVALID_POSE, OUT_OF_RANGE, ENDLESS_DEPTH, UNSUPPORTED, NO_KERNELS = (
     range(9)
 )
-TOO_MANY = 9
+TOO_MANY, INVALID_FILE = 9, 10
 TRUST_POSES, UNSIGNED, START_NORMALS = 1, 2, 4
 
 
@@ -182,10 +182,38 @@ _TYPES = {
     "collide_world_nearest": [
         c_void_p, c_void_p, c_void_p, c_size_t, c_double, c_void_p, c_void_p, c_void_p,
     ],
+    "collide_robot_load": [c_char_p, c_void_p],
+    "collide_robot_read": [c_char_p, c_size_t, c_void_p],
+    "collide_robot_free": [c_void_p],
+    "collide_robot_columns": [c_void_p],
+    "collide_robot_bodies": [c_void_p],
+    "collide_robot_around": [c_void_p],
+    "collide_robot_column_name": [c_void_p, c_size_t],
+    "collide_robot_body_name": [c_void_p, c_int],
+    "collide_robot_workspace_create": [c_void_p, c_void_p],
+    "collide_robot_workspace_free": [c_void_p],
+    "collide_robot_collide": [c_void_p, c_void_p, c_size_t, c_void_p, c_void_p, POINTER(c_size_t)],
+    "collide_robot_distance": [
+        c_void_p, c_void_p, c_size_t, c_double, c_uint, c_void_p, c_void_p, c_void_p, POINTER(c_size_t),
+    ],
+    "collide_robot_near": [
+        c_void_p, c_void_p, c_size_t, c_double, c_uint, c_void_p, c_void_p, c_size_t, c_void_p, c_void_p,
+        POINTER(c_size_t),
+    ],
+    "collide_robot_certify": [
+        c_void_p, c_void_p, c_void_p, c_size_t, c_double, c_void_p, c_void_p, c_void_p, POINTER(c_size_t),
+    ],
+    "collide_robot_sample": [
+        c_void_p, c_void_p, c_void_p, c_size_t, c_double, c_void_p, c_void_p, c_void_p, POINTER(c_size_t),
+    ],
 }
-_TEXTS = {"collide_status_text", "collide_version", "collide_world_message", "collide_workspace_message"}
+_TEXTS = {
+    "collide_status_text", "collide_version", "collide_world_message", "collide_workspace_message",
+    "collide_robot_column_name", "collide_robot_body_name",
+}
+_SIZES = {"collide_world_size", "collide_robot_columns", "collide_robot_bodies", "collide_robot_around"}
 #: What is no status.
-_OTHERS = {**dict.fromkeys(_TEXTS, c_char_p), "collide_world_size": c_size_t}
+_OTHERS = {**dict.fromkeys(_TEXTS, c_char_p), **dict.fromkeys(_SIZES, c_size_t)}
 
 
 @cache
@@ -562,6 +590,71 @@ class Asker:
         poses = Poses(X_WA.ctypes.data, len(X_WA)), Poses(X_WB.ctypes.data, len(X_WB))
         status = function(self.handle, *first, *poses, *rest, out.ctypes.data, failed)
         return status, out.astype(bool) if boolean else out, failed.value
+
+
+class CRobot:
+    """A robot from the bytes of a file, with a workspace; questions answer (statuses, answers …)."""
+
+    def __init__(self, content: bytes):
+        status, self.handle = raw_robot(content)
+        assert status == OK, library().collide_status_text(status)
+        self.workspace = raw_handle("collide_robot_workspace_create", self.handle)
+        self.columns = library().collide_robot_columns(self.handle)
+        self._free = library().collide_robot_workspace_free, library().collide_robot_free
+
+    def __del__(self):
+        if getattr(self, "workspace", None):
+            self._free[0](self.workspace)
+            self._free[1](self.handle)
+
+    def _asked(self, name: str, n: int, *arguments) -> np.ndarray:
+        """Statuses of n answers; whether function and statuses agree is looked at."""
+        statuses, failed = np.full(n, -1, dtype=np.int32), c_size_t(77)
+        given = [a.ctypes.data if isinstance(a, np.ndarray) else a for a in arguments]
+        status = getattr(library(), f"collide_robot_{name}")(self.workspace, *given, statuses.ctypes.data, failed)
+        wrong = np.flatnonzero(statuses)
+        assert status == (statuses[wrong[0]] if len(wrong) else OK), (name, status)
+        assert failed.value == (wrong[0] if len(wrong) else 0)
+        return statuses
+
+    def collides(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        hits = np.full(len(q), 7, dtype=np.uint8)
+        return self._asked("collide", len(q), _doubles(q), len(q), hits), hits
+
+    def distances(self, q: np.ndarray, limit: float = math.inf, between: int = 3) -> tuple:
+        rows, gradients = np.zeros(len(q), dtype=PAIR_DTYPE), np.full((len(q), self.columns), 7.0)
+        return self._asked("distance", len(q), _doubles(q), len(q), limit, between, rows, gradients), rows, gradients
+
+    def near(self, q: np.ndarray, limit: float, between: int = 3, capacity: int = 20_000) -> tuple:
+        rows, gradients = np.zeros(capacity, dtype=PAIR_DTYPE), np.full((capacity, self.columns), 7.0)
+        starts = np.full(len(q) + 1, 7, dtype=np.uint64)
+        statuses = self._asked(
+            "near", len(q), _doubles(q), len(q), limit, between, rows, gradients, capacity, starts
+        )
+        starts = starts.astype(np.int64)
+        return statuses, rows[: starts[-1]], gradients[: starts[-1]], starts
+
+    def certify(self, q0: np.ndarray, q1: np.ndarray, resolution: float) -> tuple:
+        verdicts, times = np.full(len(q0), 7, dtype=np.uint8), np.full(len(q0), 7.0)
+        asked = _doubles(q0), _doubles(q1), len(q0), resolution, verdicts, times
+        return self._asked("certify", len(q0), *asked), verdicts, times
+
+    def sample(self, q0: np.ndarray, q1: np.ndarray, resolution: float) -> tuple:
+        hits, times = np.full(len(q0), 7, dtype=np.uint8), np.full(len(q0), 7.0)
+        return self._asked("sample", len(q0), _doubles(q0), _doubles(q1), len(q0), resolution, hits, times), hits, times
+
+
+def raw_handle(function: str, handle: int) -> int:
+    """What a function makes of a handle."""
+    status, made = raw_shape(function, handle)
+    assert status == OK and made is not None, library().collide_status_text(status)
+    return made
+
+
+def raw_robot(content: bytes) -> tuple[int, int | None]:
+    """(status, handle) of a robot from the bytes of a file."""
+    out = c_void_p()
+    return library().collide_robot_read(content, len(content), ctypes.byref(out)), out.value
 
 
 # --- poses ----------------------------------------------------------------------------------------------------------

@@ -9,7 +9,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from naive import rng_of
+from random_robots import random_configurations, random_robot
 
 import collide
 from collide.cli import main as cli
@@ -113,3 +116,33 @@ def test_config_without_a_library_says_what_to_do(capsys, monkeypatch):
     monkeypatch.setattr(library, "_built", lambda: None)
     assert cli.main(["config", "--libs"]) == 2
     assert "there is no libcollide" in (told := capsys.readouterr().err) and "install a C compiler" in told
+
+
+def test_cmake_builds_the_examples_and_a_planners_states_are_judged_as_in_python(folder):
+    """`examples/c/validity.cpp` of a robot that Python saved."""
+    shutil.copytree(Path(__file__).resolve().parents[2] / "examples" / "c", folder / "examples")
+    lines = "cd examples\ncmake -B build -Dcollide_DIR=$(collide config --cmakedir)\ncmake --build build"
+    done = _run(folder, lines, needs=("cmake", "cc", "c++"))
+    assert done.returncode == 0, done.stdout + done.stderr
+    rng = rng_of("validity")
+    robot, world = random_robot(rng, types=("revolute", "continuous")), collide.World()
+    world.add(collide.Box(0.4, 0.4, 0.4), collide.pose([0.5, 0.0, 0.3]), name="crate")
+    world.add(collide.Halfspace([0.0, 0.0, 1.0], -0.6), name="floor")
+    checker, q = collide.RobotChecker(robot, world), random_configurations(rng, robot, 40)
+    q[1::2] = q[::2] + 0.02 * rng.normal(size=q[::2].shape)
+    checker.save(folder / "arm.collide")
+    np.savetxt(folder / "states.csv", q, delimiter=",", fmt="%.17g")
+    validity = [folder / "examples" / "build" / "validity", folder / "arm.collide", folder / "states.csv"]
+    told = subprocess.run(validity, env={}, capture_output=True, text=True, check=True).stdout.splitlines()
+    hits, clearances, free = checker.collides(q), checker.distances(q).lower, checker.certify_edges(q[:-1], q[1:]).free
+    assert 5 < hits.sum() < 35 and 3 < free.sum() < 36
+    wanted = [
+        line for k in range(len(q)) for line in (
+            f"state {k}: {'invalid' if hits[k] else 'valid'}, clearance {max(clearances[k], 0.0):.6f} m",
+            f"motion {k - 1}: {'free' if k and free[k - 1] else 'not proven free'}",
+        )
+    ]
+    assert told == [wanted[0], *wanted[2:]]
+    absent = [validity[0], folder / "none", folder / "none"]
+    done = subprocess.run(absent, env={}, capture_output=True, text=True, check=False)
+    assert done.returncode == 1 and "no such file" in done.stderr

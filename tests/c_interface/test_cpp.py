@@ -105,7 +105,7 @@ int main() {
     put(std::array<std::uint8_t, 1>{space.collides(cloud, shapes[2], here, Pose::at(0.0, 0.0, 1.2))});
     put(space.distance(cloud, shapes[2], here, Pose::at(0.0, 0.3, 1.3)));
     put(space.collides_batch(cloud, shapes[2], here, fall));
-    put(space.distance_batch(cloud, shapes[2], here, fall).pairs);
+    put(space.distance_batch(cloud, shapes[2], here, fall).rows);
     Field::Nearest nearest = cloud.nearest(points, 2);
     put(nearest.distances);
     put(nearest.rows);
@@ -258,8 +258,10 @@ int main() {
     std::vector<Pose> deep(2);
     deep[1] = Pose::at(3.0, 0.0, 0.0);
     const std::vector<double> two = {0.0, 0.0, 0.0, 0.05, 0.0, 0.0};
-    PairsOfField rows = space.distance_batch(Field::point_cloud(two, 0.1), ball, X, deep, infinity, 0);
-    EXPECT(rows.statuses[0] == COLLIDE_UNSUPPORTED && rows.statuses[1] == COLLIDE_OK && rows.pairs[1].distance > 1.8);
+    Answered<collide_pair> told = space.distance_batch(Field::point_cloud(two, 0.1), ball, X, deep, infinity, 0);
+    EXPECT(told.statuses[0] == COLLIDE_UNSUPPORTED && told.statuses[1] == COLLIDE_OK && told.rows[1].distance > 1.8);
+    EXPECT(status_of([] { Robot::load("no such file"); }) == COLLIDE_INVALID_FILE);
+    EXPECT(status_of([&] { Robot::read(cells); }) == COLLIDE_INVALID_FILE);
     return 0;
 }
 """
