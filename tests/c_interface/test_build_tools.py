@@ -33,16 +33,9 @@ def _lines(tool: str) -> str:
     return block
 
 
-@pytest.fixture
-def folder(tmp_path):
-    """A fresh folder with the program, and with the command `collide` of this installation."""
-    (tmp_path / "program.c").write_text(PROGRAM, encoding="utf-8")
-    command = tmp_path / "bin" / "collide"
-    command.parent.mkdir()
-    root = Path(collide.__file__).parents[1]
-    command.write_text(f'#!/bin/sh\nPYTHONPATH="{root}" exec "{sys.executable}" -m collide "$@"\n', encoding="utf-8")
-    command.chmod(0o755)
-    return tmp_path
+@pytest.fixture(autouse=True)
+def source(folder):
+    (folder / "program.c").write_text(PROGRAM, encoding="utf-8")
 
 
 def _run(folder: Path, lines: str, *, needs: tuple[str, ...]) -> subprocess.CompletedProcess:
