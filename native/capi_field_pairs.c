@@ -126,6 +126,23 @@ int64_t ask_facets(collide_workspace *space, const collide_mesh *mesh, const col
     return state;
 }
 
+void write_facet_walk(collide_workspace *space, const int64_t *tree, double reach, double promise, int64_t *stack, int64_t n_stack,
+                      int64_t *header)
+{
+    const double radius = 0.0;
+    space->field->ints[COUNT] = 3;
+    space->field->numbers[RADIUS] = radius;
+    memcpy(header, space->field->header, sizeof space->field->header);
+    header[WALK_TREE_AT] = address_of(tree);
+    header[WALK_STACK_AT] = address_of(stack);
+    header[BOUNDS_AT] = address_of(stack + n_stack);
+    header[ITEMS_ARE] = FACETS;
+    header[RADII_AT] = header[SHAPE_FIRST] = 0;
+    memcpy(header + REACH_OF_ITEMS, &reach, sizeof reach);
+    memcpy(header + LARGEST_RADIUS, &radius, sizeof radius);
+    memcpy(header + PROMISE, &promise, sizeof promise);
+}
+
 /* LONG_WAY; MEETS; else the pair is farther apart than a margin, or with a margin above 0 may be nearer. */
 static int64_t state_of(const struct field_pair *pair, double margin)
 {

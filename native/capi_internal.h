@@ -160,6 +160,13 @@ void begin_mesh_workspace(collide_workspace *space, void *memory, const int64_t 
 size_t field_workspace_bytes(const int64_t *measures);
 void begin_field_workspace(collide_workspace *space, void *memory, const int64_t *measures);
 
+/* Headers of kernels for robots, of M_MESH_HEADER and M_WALK_HEADER words, which work in the room of a workspace: two bodies of facets
+   (capi_mesh_pairs.c); the facets of one beside a convex part (capi_field_pairs.c), which only walks along facets are asked about
+   then. stack : 2 * n_stack words. */
+void write_mesh_header(collide_workspace *space, const collide_mesh *A, const collide_mesh *B, int64_t *header);
+void write_facet_walk(collide_workspace *space, const int64_t *tree, double reach, double promise, int64_t *stack, int64_t n_stack,
+                      int64_t *header);
+
 /* capi_pairs.c: the pair that is asked about next. */
 void take_pair(collide_workspace *space, const collide_shape *A, const collide_shape *B);
 

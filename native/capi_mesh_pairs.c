@@ -77,6 +77,12 @@ static void take_meshes(struct mesh_workspace *mesh, const collide_mesh *A, cons
     header[EXCHANGED] = exchanged;
 }
 
+void write_mesh_header(collide_workspace *space, const collide_mesh *A, const collide_mesh *B, int64_t *header)
+{
+    take_meshes(space->mesh, A, B);
+    memcpy(header, space->mesh->header, sizeof space->mesh->header);
+}
+
 /* Why a kernel left a pair to Python: matrices that are no poses, or something that C does not do. */
 collide_status why_mesh_pair(collide_workspace *space, const double *X_WA, const double *X_WB, unsigned flags)
 {

@@ -90,7 +90,7 @@ static int begin_workspace(collide_robot_workspace *space)
     begin_spheres(space);
     ZEROED(SLOT_OF_AT, space->robot->sizes[F_AROUND] + 1, 8);
     space->is_asked = arena_zeroed(&space->arena, 1, 1);
-    if (!begin_motions(space) || space->arena.failed || !fit_rows(space, PAIR_ROWS)) return 0;
+    if (!begin_motions(space) || !begin_meshes(space) || space->arena.failed || !fit_rows(space, PAIR_ROWS)) return 0;
     space->is_asked[0] = 1;
     return 1;
 }
@@ -113,6 +113,7 @@ void collide_robot_workspace_free(collide_robot_workspace *workspace)
 {
     if (workspace == NULL) return;
     end_motions(workspace);
+    collide_workspace_free(workspace->pairs);
     free(workspace->rows);
     free(workspace->reaches);
     arena_end(&workspace->arena);

@@ -53,7 +53,7 @@ enum { OF_ROBOT = 0, OF_PAIR = 2, WITH_AROUND = 1, AMONG_ROBOT = 2 };
 
 /* What a file has as plain numbers (collide/robots/checker_file.py). */
 enum {
-    F_COLUMNS, F_SHAPES, F_HAS_SPHERES,
+    F_COLUMNS, F_SHAPES, F_HAS_SPHERES, F_HAS_MESHES, F_FACET_BODIES,
     F_LINKS, F_JOINTS, F_BODIES, F_LINK_PARTS, F_PARTS, F_SELF_PAIRS, F_AROUND, F_NODES, F_UNBOUNDED, F_ROOT, F_TWINS_AFTER,
     F_SPHERES, F_MAPS, F_FEWEST,
     F_STRIDE, F_ITEMS,
@@ -96,7 +96,12 @@ enum { S_BASE, S_SLACK = LINK_POSE, S_ROUNDING, S_COUNT };
     X(map_cells, uint8_t, -1)                                                                                             \
     X(paths, int64_t, n[F_BODIES] * n[F_STRIDE])                                                                          \
     X(path_lengths, int64_t, n[F_BODIES])                                                                                 \
-    X(between, int64_t, 2 * n[F_SELF_PAIRS])
+    X(between, int64_t, 2 * n[F_SELF_PAIRS])                                                                              \
+    X(questions, int64_t, 4 * n[F_BODIES] * (n[F_AROUND] + n[F_BODIES]) * n[F_HAS_MESHES])                                \
+    X(facet_ints, int64_t, 4 * n[F_FACET_BODIES])                                                                         \
+    X(facet_numbers, double, (1 + 2 * n[F_FACET_BODIES]) * n[F_HAS_MESHES])                                               \
+    X(facet_vertices, double, -1)                                                                                         \
+    X(facet_faces, int64_t, -1)
 
 enum {
 #define X(name, type, count) SECTION_##name,
@@ -114,6 +119,7 @@ struct collide_robot {
 #undef X
     const char **texts; /* of columns, bodies, bodies around */
     collide_shape **shapes;
+    collide_mesh **meshes; /* bodies of facets */
     int64_t *shape_rows; /* of INTS, and the file's rows of doubles */
     struct arena arena;  /* all but the shapes */
 };
@@ -121,6 +127,7 @@ struct collide_robot {
 /* What a thread's questions are worked out in. */
 struct collide_robot_workspace {
     const collide_robot *robot;
+    collide_workspace *pairs; /* of questions about meshes, or NULL */
     int64_t scene[SCENE_HEADER], spheres[SPHERE_HEADER], motions[MOTION_HEADER], search[SEARCH];
     double *reaches; /* of slots, a byte each whether they are asked, rows: as many as there is room for */
     uint8_t *is_asked;
@@ -149,6 +156,11 @@ int are_configurations(const collide_robot_workspace *space, const double *q, si
 /* capi_robot_motions.c: room for motions, as a workspace begins; 0 where there is none. */
 int begin_motions(collide_robot_workspace *space);
 void end_motions(collide_robot_workspace *space);
+
+/* capi_robot_meshes.c: bodies of facets, and whether questions name these alone; questions of a workspace, 0 without memory. */
+collide_status read_meshes(collide_robot *robot);
+void free_meshes(collide_robot *robot);
+int begin_meshes(collide_robot_workspace *space);
 
 /* capi_robot_checks.c: COLLIDE_OK where nothing that kernels follow leads out of the tables. */
 collide_status check_robot(const collide_robot *robot);

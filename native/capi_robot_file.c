@@ -53,7 +53,7 @@ static int view_sections(collide_robot *robot, int64_t n_words)
     n = robot->sizes;
     if (robot->counts[SECTION_sizes] != F_SIZES) return 0;
     for (k = 0; k < F_SIZES; k++) if (n[k] < 0 || n[k] > LARGEST_SIZE) return 0;
-    if (n[F_HAS_SPHERES] > 1 || n[F_ROOT] >= n[F_LINKS] || n[F_LINK_PARTS] > n[F_PARTS] || n[F_TWINS_AFTER] > n[F_LINK_PARTS])
+    if (n[F_HAS_SPHERES] > 1 || n[F_HAS_MESHES] > 1 || (n[F_FACET_BODIES] > 0 && n[F_HAS_MESHES] == 0) || n[F_ROOT] >= n[F_LINKS] || n[F_LINK_PARTS] > n[F_PARTS] || n[F_TWINS_AFTER] > n[F_LINK_PARTS])
         return 0;
 #define X(name, type, count)                                                                        \
     if ((count) >= 0 && robot->counts[SECTION_##name] != (int64_t)(count)) return 0;
@@ -112,7 +112,8 @@ static collide_status read_robot(collide_robot *robot, const void *bytes, size_t
     memcpy(robot->file, bytes, n);
     if (!is_file(robot->kernels, robot->file, n_words) || !view_sections(robot, n_words)) return COLLIDE_INVALID_FILE;
     if ((status = read_texts(robot)) != COLLIDE_OK || (status = check_robot(robot)) != COLLIDE_OK) return status;
-    return read_shapes(robot);
+    if ((status = read_shapes(robot)) != COLLIDE_OK) return status;
+    return robot->sizes[F_HAS_MESHES] ? read_meshes(robot) : COLLIDE_OK;
 }
 
 collide_status collide_robot_read(const void *bytes, size_t n, collide_robot **robot)
@@ -164,6 +165,7 @@ void collide_robot_free(collide_robot *robot)
     int64_t k;
     if (robot == NULL) return;
     for (k = 0; robot->shapes != NULL && k < robot->sizes[F_SHAPES]; k++) collide_shape_free(robot->shapes[k]);
+    free_meshes(robot);
     arena_end(&robot->arena);
     free(robot);
 }

@@ -663,7 +663,7 @@ COLLIDE_API collide_status collide_world_nearest(const collide_world *world, col
    A robot among obstacles, from a file that `collide.RobotChecker.save` wrote in Python: links, attached objects, padding, untested
    pairs, and bodies around where they stood. Configurations are rows of collide_robot_columns doubles [rad or m], as in Python, one
    behind another. The answers are the checker's, bit by bit. COLLIDE_UNSUPPORTED, never a guess: what kernels leave to Python,
-   bodies near meshes that are not convex, and what touches within rounding. `statuses` : NULL, or room for n: which are left so;
+   distances near meshes that are not convex, and what touches within rounding. `statuses` : NULL, or room for n: which are left so;
    the others are answered, *failed, unless failed is NULL, is the first of those left, and its status is returned. */
 typedef struct collide_robot collide_robot;
 

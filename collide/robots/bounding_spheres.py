@@ -180,8 +180,8 @@ class SphereWorkspace:
     @staticmethod
     def no_tables() -> dict[str, np.ndarray]:
         """Empty tables of the same names."""
-        names = "sphere_counts around_bodies sphere_rows part_kinds part_numbers map_ints map_doubles map_cells"
-        empty = {name: np.zeros(0) for name in names.split()}
+        of_spheres = ("sphere_counts", "around_bodies", "sphere_rows", "part_kinds", "part_numbers")
+        empty = dict.fromkeys((*of_spheres, "map_ints", "map_doubles", "map_cells"), np.zeros(0))
         return {"header": np.zeros(layout.SPHERE_HEADER, dtype=np.int64), **empty}
 
 

@@ -170,6 +170,13 @@ class CheckWorkspace:
             return SphereWorkspace.no_tables()
         return self._spheres.tables(self.setting)
 
+    def mesh_tables(self) -> dict[str, np.ndarray]:
+        """Those of `MeshQuestions.tables`, empty where nothing is asked about meshes."""
+        self.ask_meshes(self.setting)
+        if self._meshes is None:
+            return MeshQuestions.no_tables()
+        return self._meshes.tables(len(self.setting.bodies))
+
     def motions(self, resolution: float) -> MotionWorkspace:
         """The workspace of `certify_motions`, for this resolution [rad or m]."""
         if self._motions is None:

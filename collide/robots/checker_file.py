@@ -44,6 +44,7 @@ SECTIONS = {
     "allowed": "u1", "nodes": "<f8", "node_links": "<i8", "unbounded": "<i8", "sphere_counts": "<i8",
     "around_bodies": "<f8", "sphere_rows": "<f8", "part_kinds": "<i8", "part_numbers": "<f8", "map_ints": "<i8",
     "map_doubles": "<f8", "map_cells": "u1", "paths": "<i8", "path_lengths": "<i8", "between": "<i8",
+    "questions": "<i8", "facet_ints": "<i8", "facet_numbers": "<f8", "facet_vertices": "<f8", "facet_faces": "<i8",
 }
 
 
@@ -79,7 +80,9 @@ def _sections(checker: CheckerScene, space: CheckWorkspace) -> dict[str, np.ndar
     made, spheres, paths = space.tables(), space.sphere_tables(), space.motions(1.0)
     headers = {"scene": space.header, "spheres": spheres.pop("header"), "motions": paths.header}
     sizes = [headers[of][word] for of, words in SIZES.items() for word in words]
-    counts = robot.dof, len(setting.table.packed), int(setting.spheres is not None)
+    meshes = space.mesh_tables()
+    has_meshes, n_facet_bodies = int(len(meshes["facet_numbers"]) > 0), len(meshes["facet_ints"])
+    counts = robot.dof, len(setting.table.packed), int(setting.spheres is not None), has_meshes, n_facet_bodies
     names = [*robot.joint_names, *checker.bodies, *checker.around]
     slack = space.header[layout.SLACK : layout.SLACK + 1].view(np.float64)
     rounding = paths.header[motions.ROUNDING :].view(np.float64)
@@ -88,7 +91,7 @@ def _sections(checker: CheckerScene, space: CheckWorkspace) -> dict[str, np.ndar
         "names": np.frombuffer("".join(f"{name}\0" for name in names).encode(), dtype=np.uint8),
         "scalars": np.concatenate([setting.base, slack, rounding]), "joint_ints": robot.joint_table.ints,
         "joint_doubles": robot.joint_table.doubles, "moves": robot.moves, **_shapes(setting.table), **made, **spheres,
-        **paths.tables(),
+        **paths.tables(), **meshes,
     }
 
 

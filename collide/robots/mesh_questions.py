@@ -9,7 +9,9 @@ import numpy as np
 from collide.base.lazy_modules import lazy_module
 from collide.kernels import address_of, code_of
 from collide.lowering.kind_of_shape import kind_of
-from collide.lowering.parts import is_single_convex
+from collide.lowering.packed_convex import POINTS
+from collide.lowering.parts import convex_set_of, is_single_convex
+from collide.narrowphase.bounds import PROMISE_CURVED, PROMISE_STORED
 from collide.narrowphase.dispatch import Method, method_of
 from collide.robots import mesh_states as layout
 from collide.robots.check_tables import RobotBody, Setting, without_meshes
@@ -36,6 +38,8 @@ class MeshQuestions:
         `answer_pairs`.
         """
         self._held: list[Any] = []
+        #: Address of a header → the bodies of facets that it asks about, in the order of the question.
+        self._asked: dict[int, tuple[Any, ...]] = {}
         self._of_meshes: dict[int, Any] = {}
         self._known: dict[tuple, tuple] = {}
         self._space, self._workspace, self._packed = facet_queries.Workspace(512), workspace, setting.table.packed[0]
@@ -110,19 +114,63 @@ class MeshQuestions:
     def _of_items(self, mesh: Shape) -> int:
         """A question of the facets of a mesh, beside a part in whose place kernels write others."""
         if id(mesh) not in self._of_meshes:
-            items = item_calls.facets_of(facet_bodies.body_of(mesh))
-            self._of_meshes[id(mesh)] = item_calls.GapQuestion(items, self._packed, self._workspace)
+            body = facet_bodies.body_of(mesh)
+            made = item_calls.GapQuestion(item_calls.facets_of(body), self._packed, self._workspace)
+            self._of_meshes[id(mesh)], self._asked[address_of(made.header)] = made, (body,)
         return address_of(self._of_meshes[id(mesh)].header)
 
     def _of_facets(self, A: Shape, B: Shape) -> int:
-        pair = facet_calls.pair_of(facet_bodies.body_of(A), facet_bodies.body_of(B))
+        bodies = facet_bodies.body_of(A), facet_bodies.body_of(B)
+        pair = facet_calls.pair_of(*bodies)
         pair.need_slabs()
         n_stack = facet_queries.stack_of(pair.A.tree, pair.B.tree)
         if n_stack > self._space.n_stack:
             self._space = facet_queries.Workspace(n_stack)
         header = facet_calls.pair_header(pair.A, pair.B, pair.exchanged, self._space)
         self._held.append((pair, self._space, header))
+        self._asked[address_of(header)] = bodies
         return address_of(header)
+
+    def tables(self, n_bodies: int) -> dict[str, np.ndarray]:
+        """The questions of the first bodies, and the bodies of facets, by name (`checker_file.py`).
+
+        Of a question: how, the numbers of two bodies of facets or of a single body, and the row of a pose
+        around.
+        """
+        bodies = [*{id(body): body for asked in self._asked.values() for body in asked}.values()]
+        known = {id(body): k for k, body in enumerate(bodies)}
+        table = self._table[:n_bodies, : len(self._around) + n_bodies]
+        questions = np.full((*table.shape[:2], 4), -1, dtype=np.int64)
+        questions[:, :, 0], questions[:, :, 3] = table[:, :, layout.HOW], table[:, :, layout.POSE_ROW]
+        for a, b in np.argwhere(table[:, :, layout.HEADER_AT]).tolist():
+            asked = self._asked[int(table[a, b, layout.HEADER_AT])]
+            questions[a, b, 1 : 1 + len(asked)] = [known[id(body)] for body in asked]
+        numbers = [PROMISE_STORED if self._packed.kind == POINTS else PROMISE_CURVED]
+        for body in bodies:
+            numbers += [body.radius, facet_bodies.reach_of(body)]
+        return {"questions": questions, "facet_numbers": np.array(numbers), **_facets_of(bodies)}
+
+    @staticmethod
+    def no_tables() -> dict[str, np.ndarray]:
+        """Empty tables of the same names."""
+        names = ("questions", "facet_numbers", "facet_ints", "facet_vertices", "facet_faces")
+        return dict.fromkeys(names, np.zeros(0))
+
+
+def _facets_of(bodies: list) -> dict[str, np.ndarray]:
+    """Vertices and faces of meshes, and points of hulls, for programs that make bodies of facets anew."""
+    ints, vertices, faces = [], [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)]
+    for body in bodies:
+        is_mesh = isinstance(body.shape, Mesh)
+        corners = body.shape.vertices if is_mesh else convex_set_of(body.shape).points
+        triangles = body.shape.faces if is_mesh else faces[0]
+        ints.append((is_mesh, len(corners), len(triangles), body.solid))
+        vertices.append(corners)
+        faces.append(triangles)
+    return {
+        "facet_ints": np.array(ints, dtype=np.int64), "facet_vertices": np.concatenate(vertices),
+        "facet_faces": np.concatenate(faces),
+    }
 
 
 class Single(NamedTuple):

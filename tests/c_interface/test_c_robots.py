@@ -14,8 +14,9 @@ from pathlib import Path
 import c_library as c
 import numpy as np
 import pytest
+import surfaces
 from naive import pose, random_pose, rng_of
-from random_robots import random_configurations, random_robot, scene_of_spheres
+from random_robots import random_configurations, random_link_shape, random_robot, ring, scene_of_spheres
 
 import collide
 from collide.kernels import mode
@@ -131,23 +132,53 @@ def test_bodies_that_have_moved_are_where_they_stand(tmp_path):
     assert told["hits"] > before.sum() > 0 or (checker.collides(q) != before).any()
 
 
-@pytest.mark.parametrize("form", ["spheres", "hulls"])
+def mesh_shape(rng, size: float) -> collide.Shape:
+    """Solids and open surfaces that are not convex, and convex shapes of all kinds."""
+    kind = int(rng.integers(4))
+    if kind == 0:
+        return ring().scaled(1.5 * size)
+    if kind == 1:
+        vertices, faces = surfaces.torus()
+        return collide.Mesh(vertices * size, faces)
+    if kind == 2:
+        return collide.Mesh(size * rng.normal(size=(4, 3)), [(0, 1, 2), (0, 1, 3), (1, 2, 3)], solid=False)
+    return random_link_shape(rng, size)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 3])
+def test_robots_with_meshes_have_pythons_bits(seed, tmp_path):
+    """Meshes on links and around: booleans and motions; distances of meshes are left to Python."""
+    rng = rng_of("robots with meshes in C", seed)
+    robot, world = random_robot(rng, shape=mesh_shape, size=0.15), crowd(rng, 8, 1.2)
+    for k in range(6):
+        world.add(mesh_shape(rng, 0.3), random_pose(rng, 0.8), name=f"mesh{k}")
+    checker = collide.RobotChecker(robot, world, padding={robot.links[0]: 0.01} if seed % 2 else 0.0)
+    if seed == 0:
+        checker.attach("ring", robot.links[-1], ring().scaled(0.1), pose(t=(0, 0, 0.1)), touch=robot.links)
+    q = random_configurations(rng, robot, 60)
+    told = compared(checker, c.CRobot(saved(checker, tmp_path)), q, q + rng.normal(size=q.shape) * 0.05)
+    assert told["hits"] > 10 and told["free"] > 3 and told["open"] < 20 and told["open_edges"] < 30, told
+    assert told["edges 2"] > 10, told
+
+
+@pytest.mark.parametrize("form", ["spheres", "hulls", "meshes"])
 @pytest.mark.parametrize("name", ["panda", "ur5"])
 def test_arms_have_pythons_bits(name, form, tmp_path):
     folder = ROBOTS / name
     if not folder.is_dir():
         pytest.skip("../shared/data/robots is absent")
     urdf = folder / (f"{name}_spherized.urdf" if form == "spheres" else f"{name}.urdf")
-    robot = collide.Robot.load(urdf, srdf=folder / f"{name}.srdf", meshes="hull")
+    robot = collide.Robot.load(urdf, srdf=folder / f"{name}.srdf", meshes="mesh" if form == "meshes" else "hull")
     rng, world = rng_of("arms in C", name, form), collide.World()
     world.add(collide.Box(1.0, 1.0, 0.1), collide.pose([0.9, 0.0, -0.2]), name="table")
     world.add(collide.Cylinder(0.1, 0.6), collide.pose([0.5, 0.3, 0.4]), name="pole")
     checker = collide.RobotChecker(robot, world)
-    q = random_configurations(rng, robot, 200)
+    q = random_configurations(rng, robot, 80 if form == "meshes" else 200)
     told = compared(checker, c.CRobot(saved(checker, tmp_path)), q, q + rng.normal(size=q.shape) * 0.1)
-    assert told["open"] == told["open_rows"] == told["open_edges"] == 0 and told["hits"] > 20, told
+    assert told["open"] + told["open_edges"] <= 3 * (form == "meshes") and told["hits"] > 5, told
+    assert (told["open_rows"] == 0) == (form != "meshes")
     if name == "panda":
-        assert told["free"] > 60 and told["edges 1"] > 40 and told["near"] > 600, told
+        assert told["free"] > 40 and told["edges 1"] > 30 and (told["near"] > 600) == (form != "meshes"), told
 
 
 def test_threads_share_a_robot(tmp_path):
@@ -296,12 +327,13 @@ def survivors(path: str, first: int, n: int) -> dict[str, list[int]]:
     return told
 
 
-@pytest.mark.parametrize("form", ["hulls", "spheres"])
+@pytest.mark.parametrize("form", ["hulls", "spheres", "meshes"])
 def test_files_that_lie_are_refused_or_harmless(form, tmp_path):
     """Of 600 files with a word replaced and a digest that fits, each is refused or answers something; none ends the
     process, or goes on for ever."""
     rng = rng_of("lying robots in C", form)
-    checker = collide.RobotChecker(random_robot(rng), crowd(rng, 10, 1.0), padding=0.01)
+    robot = random_robot(rng, shape=mesh_shape if form == "meshes" else None)
+    checker = collide.RobotChecker(robot, crowd(rng, 10, 1.0), padding=0.01 * (form == "hulls"))
     saved(scene_of_spheres(rng) if form == "spheres" else checker, tmp_path)
     program = (
         "import json, sys; sys.path[:0] = json.loads(sys.argv[1]); import test_c_robots as t; "
