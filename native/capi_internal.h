@@ -59,6 +59,14 @@ static inline int is_coordinate(double value) { return fabs(value) <= LARGEST; }
 
 static inline int64_t address_of(const void *place) { return (int64_t)(intptr_t)place; }
 
+/* Put what was made where others may look for it, unless another thread was sooner; whether it was not. */
+#if defined(_MSC_VER)
+#include <intrin.h>
+#define PUT_IF_NULL(place, made) (_InterlockedCompareExchangePointer((void *volatile *)(place), (made), NULL) == NULL)
+#else
+#define PUT_IF_NULL(place, made) __sync_bool_compare_and_swap((place), NULL, (made))
+#endif
+
 /* A kernel's address, as other kernels take it, from where a table holds it. */
 static inline int64_t code_at(const void *function)
 {
@@ -97,7 +105,7 @@ struct collide_shape {
     void *block;        /* holds coordinates and coarse points */
     void *tree;         /* NULL where there is none */
     struct hull_faces *volatile faces; /* NULL until contacts are asked for (capi_faces.h) */
-    struct collide_mesh *volatile surface; /* NULL until rays are asked for (capi_mesh.c) */
+    struct collide_mesh *volatile surface; /* NULL until rays are asked for, or a world asks about it with a mesh (capi_mesh.c) */
 };
 
 struct collide_shape_set {

@@ -93,6 +93,17 @@ static void keep(const struct collide_kernels *kernels, struct arena *arena, con
     kernels->fill_slabs(address_of(mesh->tree), mesh->tree[SLABS_AT], address_of(work));
 }
 
+/* The box around vertices. */
+static void box_around(const double *vertices, int64_t n, collide_mesh *mesh)
+{
+    int64_t k;
+    for (k = 0; k < 3 * n; k++) {
+        double *low = &mesh->low[k % 3], *high = &mesh->high[k % 3];
+        if (k < 3 || vertices[k] < *low) *low = vertices[k];
+        if (k < 3 || vertices[k] > *high) *high = vertices[k];
+    }
+}
+
 /* The tree of facets, and a ball around them; mesh->radius is set. */
 static collide_status build_mesh(const struct collide_kernels *kernels, const double *vertices, int64_t n, const int64_t *faces,
                             int64_t n_facets, collide_mesh *mesh)
@@ -100,6 +111,7 @@ static collide_status build_mesh(const struct collide_kernels *kernels, const do
     struct arena arena;
     struct filled made;
     int64_t m[MEASURES];
+    box_around(vertices, n, mesh);
     workspace_sizes(kernels, m);
     if (m[M_TREE_INTS] != TREE_INTS || m[M_TREE_NUMBERS] != TREE_NUMBERS) return COLLIDE_NO_KERNELS;
     arena_begin(&arena);

@@ -12,7 +12,8 @@ struct collide_mesh {
     int64_t tree[10];   /* the tree's header */
     double numbers[7];  /* the tree's numbers */
     int64_t content[2]; /* digest of the facets */
-    double radius, reach; /* reach : of the facets from the tree's centre */
+    double radius, reach;   /* reach : of the facets from the tree's centre */
+    double low[3], high[3]; /* a box around its vertices */
     double *points;
     int32_t *corners; /* three a facet: numbers of vertices, equal for equal ones */
     collide_shape *volatile hull;             /* NULL until half-spaces are asked about (capi_mesh_shapes.c) */

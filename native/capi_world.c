@@ -50,19 +50,17 @@ static int reserve(collide_world *world, size_t more)
     if (!(resize(&world->ids, rows, sizeof *world->ids) && resize(&world->X_WBs, rows, 16 * sizeof(double)) &&
           resize(&world->poses, rows, POSE * sizeof(double)) && resize(&world->boxes, rows, 6 * sizeof(double)) &&
           resize(&world->row_of, rows, 8) && resize(&world->traits, rows, 8 * TRAITS) && resize(&world->leaf_of, rows, 8) &&
-          resize(&world->changed, rows, 8) && resize(&world->first, rows, 8) && resize(&world->meshed, rows, 8) &&
+          resize(&world->changed, rows, 8) && resize(&world->first, rows, 8) && resize(&world->is_whole, rows, 8) &&
           resize(&world->unbounded, rows, 8) && resize(&world->numbers, rows, 8) && resize(&world->is_moved, rows, 1) &&
-          resize(&world->is_alive, rows, 1) && resize(&table->ints, rows, 8 * INTS) &&
+          resize(&world->is_alive, rows, 1) && resize(&world->wholes, rows, sizeof *world->wholes) &&
+          resize(&table->ints, rows, 8 * INTS) &&
           resize(&table->numbers, rows, NUMBERS * sizeof(double)) && resize((void *)&table->shapes, rows, sizeof *table->shapes) &&
           resize(&table->users, rows, sizeof(size_t)) && resize(&table->order, rows, sizeof(size_t)) &&
           resize(&table->unused, rows, sizeof(size_t)) && resize(&tree->nodes, 3 * rows, 6 * sizeof(double)) &&
           resize(&tree->links, 3 * rows, 8 * LINK) &&
           resize(&tree->scratch, 2 * rows + 34 + (size_t)world->measures[W_STACK], 8)))
         return 0;
-    for (; world->capacity < n; world->capacity++) {
-        world->first[world->capacity] = (int64_t)world->capacity;
-        world->meshed[world->capacity] = 0;
-    }
+    for (; world->capacity < n; world->capacity++) world->first[world->capacity] = (int64_t)world->capacity;
     world->first[n] = (int64_t)n;
     return 1;
 }
@@ -101,7 +99,10 @@ collide_status collide_world_create(collide_world **world)
 
 void collide_world_free(collide_world *world)
 {
+    size_t k;
     if (world == NULL) return;
+    for (k = 0; k < world->n; k++) collide_shape_free(world->wholes[k].bound);
+    free(world->wholes);
     free(world->ids);
     free(world->X_WBs);
     free(world->poses);
@@ -111,7 +112,7 @@ void collide_world_free(collide_world *world)
     free(world->leaf_of);
     free(world->changed);
     free(world->first);
-    free(world->meshed);
+    free(world->is_whole);
     free(world->unbounded);
     free(world->numbers);
     free(world->is_moved);
@@ -253,6 +254,8 @@ static void close_gaps(collide_world *world)
         memmove(world->boxes + 6 * n, world->boxes + 6 * k, 6 * sizeof(double));
         memmove(world->traits + TRAITS * n, world->traits + TRAITS * k, TRAITS * sizeof(int64_t));
         world->traits[TRAITS * n + FLAGS] &= STATIC_BIT | STILL_BIT; /* that it has changed is forgotten */
+        world->wholes[n] = world->wholes[k];
+        world->is_whole[n] = world->is_whole[k];
         world->row_of[n] = world->row_of[k];
         world->is_moved[n] = 0;
         world->is_alive[n++] = 1;
@@ -271,8 +274,9 @@ static collide_status check_body(collide_world *world, const collide_body *body,
     if (body->size != sizeof *body)
         return refuse(world->message, COLLIDE_INVALID_ARGUMENT, "%s: bodies[%zu]: size is %zu; begin with COLLIDE_BODY_DEFAULT",
                       caller, k, body->size);
-    if (body->shape == NULL)
-        return refuse(world->message, COLLIDE_INVALID_ARGUMENT, "%s: bodies[%zu]: shape is NULL", caller, k);
+    if ((body->shape != NULL) + (body->mesh != NULL) + (body->field != NULL) != 1)
+        return refuse(world->message, COLLIDE_INVALID_ARGUMENT, "%s: bodies[%zu]: one of shape, mesh and field must not be NULL",
+                      caller, k);
     if (body->X_WB != NULL && check_poses(world, caller, body->X_WB, 1, NULL) != COLLIDE_OK)
         return refuse(world->message, COLLIDE_INVALID_POSE,
                       "%s: bodies[%zu]: X_WB is no pose: finite, a rotation, last row 0 0 0 1", caller, k);
@@ -290,10 +294,27 @@ static int32_t put_body(collide_world *world, const collide_body *body)
     traits[GROUP] = body->group;
     traits[MASK] = body->mask;
     traits[ALLOWED_AT] = world->leaf_of[row] = -1;
-    world->row_of[row] = take_shape(&world->table, body->shape);
+    world->is_whole[row] = world->wholes[row].bound != NULL;
+    world->row_of[row] = take_shape(&world->table, world->is_whole[row] ? world->wholes[row].bound : body->shape);
     world->is_alive[row] = world->is_moved[row] = 1;
     world->n_alive++;
     return world->ids[row] = world->next_id++;
+}
+
+/* What n new bodies are that are asked about as wholes, into rows for which there is memory; where that fails nothing is kept. */
+static collide_status make_wholes(collide_world *world, const collide_body *bodies, size_t n)
+{
+    static const struct whole_body none = {NULL, NULL, NULL};
+    struct whole_body *wholes = world->wholes + world->n;
+    collide_status status = COLLIDE_OK;
+    size_t k;
+    for (k = 0; k < n && status == COLLIDE_OK; k++) {
+        wholes[k] = none;
+        if (bodies[k].shape == NULL) status = make_whole(bodies[k].mesh, bodies[k].field, &wholes[k]);
+    }
+    if (status == COLLIDE_OK) return status;
+    while (k-- > 0) collide_shape_free(wholes[k].bound);
+    return refuse(world->message, status, "collide_world_add: %s", collide_status_text(status));
 }
 
 collide_status collide_world_add(collide_world *world, const collide_body *bodies, size_t n, int32_t *ids)
@@ -313,6 +334,7 @@ collide_status collide_world_add(collide_world *world, const collide_body *bodie
     given = round_as_kernels_do();
     if (world->n > MIN_ROWS + 2 * world->n_alive) close_gaps(world);
     status = reserve(world, n) ? COLLIDE_OK : refuse(world->message, COLLIDE_NO_MEMORY, "%s: out of memory", caller);
+    if (status == COLLIDE_OK) status = make_wholes(world, bodies, n);
     if (status == COLLIDE_OK) {
         size_t first = world->n;
         for (k = 0; k < n; k++) ids[k] = put_body(world, bodies + k);
@@ -334,6 +356,8 @@ collide_status collide_world_remove(collide_world *world, int32_t id)
     world->is_alive[row] = 0;
     world->n_alive--;
     leave_shape(&world->table, world->row_of[row]);
+    collide_shape_free(world->wholes[row].bound);
+    world->wholes[row].bound = NULL;
     for (k = 0; k < world->n_allowed_keys; k++)
         if (first_of(world->allowed_keys[k]) != row && second_of(world->allowed_keys[k]) != row)
             world->allowed_keys[n++] = world->allowed_keys[k];
@@ -369,23 +393,46 @@ collide_status collide_world_move(collide_world *world, const int32_t *ids, size
     return COLLIDE_OK;
 }
 
-collide_status collide_world_replace(collide_world *world, int32_t id, const collide_shape *shape)
+/* Give a body what it is to be from now on. */
+static collide_status replace(collide_world *world, const char *caller, int32_t id, const collide_shape *shape,
+                              const collide_mesh *mesh, const collide_field *field)
 {
-    static const char caller[] = "collide_world_replace";
+    struct whole_body whole = {NULL, NULL, NULL};
+    collide_status status = COLLIDE_OK;
     int64_t row, before;
     rounding given;
     if (world == NULL) return COLLIDE_INVALID_ARGUMENT;
     if ((row = row_of_id(world, id)) < 0) return unknown_body(world, caller, "id", 0, id);
-    if (shape == NULL)
-        return refuse(world->message, COLLIDE_INVALID_ARGUMENT, "%s: the shape of body %ld is NULL", caller, (long)id);
+    if (shape == NULL && mesh == NULL && field == NULL)
+        return refuse(world->message, COLLIDE_INVALID_ARGUMENT, "%s: what body %ld is to be is NULL", caller, (long)id);
+    if (shape == NULL) status = make_whole(mesh, field, &whole);
+    if (status != COLLIDE_OK) return refuse(world->message, status, "%s: %s", caller, collide_status_text(status));
     given = round_as_kernels_do();
     before = world->row_of[row];
-    world->row_of[row] = take_shape(&world->table, shape);
+    world->row_of[row] = take_shape(&world->table, shape != NULL ? shape : whole.bound);
     leave_shape(&world->table, before);
+    collide_shape_free(world->wholes[row].bound);
+    world->wholes[row] = whole;
+    world->is_whole[row] = shape == NULL;
     world->is_moved[row] = 1;
     move_flagged(world, 1);
     round_as_before(given);
     return COLLIDE_OK;
+}
+
+collide_status collide_world_replace(collide_world *world, int32_t id, const collide_shape *shape)
+{
+    return replace(world, "collide_world_replace", id, shape, NULL, NULL);
+}
+
+collide_status collide_world_replace_mesh(collide_world *world, int32_t id, const collide_mesh *mesh)
+{
+    return replace(world, "collide_world_replace_mesh", id, NULL, mesh, NULL);
+}
+
+collide_status collide_world_replace_field(collide_world *world, int32_t id, const collide_field *field)
+{
+    return replace(world, "collide_world_replace_field", id, NULL, NULL, field);
 }
 
 collide_status collide_world_sleep(collide_world *world, const int32_t *ids, size_t n, int asleep)

@@ -3,7 +3,7 @@
 #ifndef COLLIDE_CAPI_WORLD_H
 #define COLLIDE_CAPI_WORLD_H
 
-#include "capi_contacts.h"
+#include "capi_internal.h"
 
 /* --- layouts; `begin_world` compares their sizes with what the kernels say (collide/casts/world_constants.py) ------------ */
 
@@ -55,13 +55,21 @@ struct body_tree {
     size_t n_sections, n_holes;
 };
 
+/* What a body is that is asked about as a whole, and a convex set around it, which is the world's; NULL of convex shapes. */
+struct whole_body {
+    const collide_mesh *mesh;
+    const collide_field *field;
+    collide_shape *bound;
+};
+
 struct collide_world {
     const struct collide_kernels *kernels;
     int64_t measures[WORLD_MEASURES];
     /* Columns, a row a body in the order of ids; those of removed bodies stay until they are many. */
     int32_t *ids;
     double *X_WBs, *poses, *boxes;
-    int64_t *row_of, *traits, *leaf_of, *changed, *first, *meshed, *unbounded, *numbers;
+    struct whole_body *wholes;
+    int64_t *row_of, *traits, *leaf_of, *changed, *first, *is_whole, *unbounded, *numbers;
     uint8_t *is_moved, *is_alive;
     size_t n, n_alive, capacity, n_unbounded;
     int64_t n_changed;
@@ -88,8 +96,15 @@ struct world_space {
     uint8_t hits[BLOCK];
 };
 
+static inline int is_whole_key(const collide_world *world, int64_t key)
+{
+    return world->is_whole[key >> 32] != 0 || world->is_whole[key & 0xffffffff] != 0;
+}
+
 /* Write a sentence, and return the status. */
 collide_status refuse(char *message, collide_status status, const char *format, ...);
+
+collide_status refuse_pair(const collide_world *world, collide_workspace *space, int64_t key, collide_status status);
 
 static inline int64_t key_of(int64_t i, int64_t j) { return i < j ? i << 32 | j : j << 32 | i; }
 static inline int64_t first_of(int64_t key) { return key >> 32; }
@@ -117,6 +132,8 @@ double spacing_of(const struct body_tree *tree);
 collide_status check_question(const collide_world *world, collide_workspace *space, const char *caller, int is_good,
                               const char *what);
 collide_status no_memory(collide_workspace *space);
+/* COLLIDE_TOO_MANY, and how many there are, where there is no room for all. */
+collide_status too_many(collide_workspace *space, size_t count, size_t capacity);
 /* Room for so many keys; 0 where there is none. */
 int fit_keys(struct world_space *own, size_t n);
 /* Sort keys of bodies below n, of which there are counts. */
@@ -124,5 +141,11 @@ void sort_keys(struct world_space *own, size_t n_keys, size_t n);
 /* Answer up to BLOCK keys of bodies, or of a point and bodies where X_WP is not NULL, into own->hits or own->rows. */
 collide_status answer_keys(const collide_world *world, collide_workspace *space, const int64_t *keys, size_t n, const double *X_WP,
                            int boolean, double limit);
+
+/* capi_world_wholes.c: what a body with a mesh or a field is, as it is added. And a pair with such a body: whether it meets, or its
+   row; what the pair queries of this interface do not answer is COLLIDE_UNSUPPORTED, and the bodies are named. */
+collide_status make_whole(const collide_mesh *mesh, const collide_field *field, struct whole_body *whole);
+collide_status whole_meets(const collide_world *world, collide_workspace *space, int64_t key, uint8_t *hit);
+collide_status row_of_whole(const collide_world *world, collide_workspace *space, int64_t key, double limit, collide_pair *row);
 
 #endif

@@ -1,11 +1,18 @@
 /* Shapes, rays, points and boxes from outside a world against its bodies, as collide/worlds/outside.py and casts.py answer
    them. */
+#include "capi_contacts.h"
 #include "capi_world.h"
 
 #include <math.h>
 #include <stdlib.h>
 
 typedef char hits_are_rows[sizeof(collide_world_hit) == 96 && offsetof(collide_world_hit, hit) == 88 ? 1 : -1];
+
+static collide_status refuse_body(const collide_world *world, collide_workspace *space, const char *what, int64_t body,
+                                  collide_status status)
+{
+    return refuse(space->message, status, "%s and body %ld: %s", what, (long)world->ids[body], collide_status_text(status));
+}
 
 /* --- boxes and shapes ----------------------------------------------------------------------------------------------- */
 
@@ -48,7 +55,7 @@ collide_status collide_world_boxes_near(const collide_world *world, collide_work
     if (status != COLLIDE_OK) return status;
     for (k = 0; k < n && k < capacity; k++) ids[k] = world->ids[workspace->world->keys[k]];
     *count = n;
-    return n <= capacity ? COLLIDE_OK : refuse(workspace->message, COLLIDE_TOO_MANY, "%zu bodies, and room for %zu", n, capacity);
+    return too_many(workspace, n, capacity);
 }
 
 /* The box around a shape at a pose. */
@@ -78,19 +85,18 @@ static collide_status rows_of_shape(const collide_world *world, collide_workspac
         int64_t body = own->keys[k];
         collide_pair row;
         collide_status status;
+        if (world->is_whole[body]) return refuse_body(world, space, "the shape", body, COLLIDE_UNSUPPORTED);
         take_pair(space, shape, shape_of_body(world, body));
         status = row_of_pair(space, X_WS, world->X_WBs + 16 * body, limit, COLLIDE_TRUST_POSES, &row);
         if (status != COLLIDE_OK && status != COLLIDE_ENDLESS_DEPTH)
-            return refuse(space->message, status, "the shape and body %ld: %s", (long)world->ids[body],
-                          collide_status_text(status));
+            return refuse_body(world, space, "the shape", body, status);
         if (row.lower > limit) continue;
         row.a = -1;
         row.b = world->ids[body];
         if (*count < capacity) rows[*count] = row;
         ++*count;
     }
-    if (*count > capacity) return refuse(space->message, COLLIDE_TOO_MANY, "%zu rows, and room for %zu", *count, capacity);
-    return COLLIDE_OK;
+    return too_many(space, *count, capacity);
 }
 
 collide_status collide_world_query(const collide_world *world, collide_workspace *workspace, const collide_shape *shape,
@@ -160,7 +166,7 @@ static collide_status cast_ray(const collide_world *world, struct world_space *o
     tree[R_FIRST_AT] = address_of(world->first);
     tree[R_N_BODIES] = (int64_t)world->n;
     tree[R_SKIPPED_AT] = address_of(own->skipped);
-    tree[R_MESHED_AT] = address_of(world->meshed);
+    tree[R_MESHED_AT] = address_of(world->is_whole);
     tree[R_UNBOUNDED_AT] = address_of(world->unbounded);
     tree[R_N_UNBOUNDED] = (int64_t)world->n_unbounded;
     limit = ldexp(limit, (int)exponent);
@@ -274,7 +280,11 @@ static collide_status nearest_of_keys(const collide_world *world, collide_worksp
     for (k = 0; k < 3; k++) X_WP[4 * k + 3] = point[k];
     for (first = 0; first < n; first += BLOCK) {
         size_t some = n - first < BLOCK ? n - first : BLOCK;
-        collide_status status = answer_keys(world, space, own->keys + first, some, X_WP, 0, INFINITE);
+        collide_status status;
+        for (k = 0; k < some; k++)
+            if (world->is_whole[own->keys[first + k]])
+                return refuse_body(world, space, "a point", own->keys[first + k], COLLIDE_UNSUPPORTED);
+        status = answer_keys(world, space, own->keys + first, some, X_WP, 0, INFINITE);
         if (status != COLLIDE_OK) return status;
         for (k = 0; k < some; k++) {
             const collide_pair *row = &own->rows[k];

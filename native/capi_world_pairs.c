@@ -1,4 +1,5 @@
 /* Questions about all pairs of a world, as collide/worlds/pair_queries.py, minimum.py and contacts.py answer them. */
+#include "capi_contacts.h"
 #include "capi_world.h"
 
 #include <math.h>
@@ -118,7 +119,7 @@ static int near_pairs(const collide_world *world, struct world_space *own, doubl
 
 /* --- pairs of bodies ------------------------------------------------------------------------------------------------ */
 
-static collide_status refuse_pair(const collide_world *world, collide_workspace *space, int64_t key, collide_status status)
+collide_status refuse_pair(const collide_world *world, collide_workspace *space, int64_t key, collide_status status)
 {
     return refuse(space->message, status, "bodies %ld and %ld: %s", (long)world->ids[first_of(key)],
                   (long)world->ids[second_of(key)], collide_status_text(status));
@@ -173,17 +174,44 @@ collide_status check_question(const collide_world *world, collide_workspace *spa
     return begin_question(world, space) ? COLLIDE_OK : no_memory(space);
 }
 
-/* Whether one of n keys hits. */
+/* How many of n keys, BLOCK at most, are of convex shapes before the first that is not. */
+static size_t n_convex(const collide_world *world, const int64_t *keys, size_t n)
+{
+    size_t k = 0;
+    while (k < n && k < BLOCK && !is_whole_key(world, keys[k])) k++;
+    return k;
+}
+
+/* Answer the first of n keys, into own->hits or own->rows; *some : how many. */
+static collide_status answer_some(const collide_world *world, collide_workspace *space, const int64_t *keys, size_t n, int boolean,
+                                  double limit, size_t *some)
+{
+    struct world_space *own = space->world;
+    if ((*some = n_convex(world, keys, n)) > 0) return answer_keys(world, space, keys, *some, NULL, boolean, limit);
+    *some = 1;
+    return boolean ? whole_meets(world, space, keys[0], own->hits) : row_of_whole(world, space, keys[0], limit, own->rows);
+}
+
+/* Whether one of n keys hits: those of convex shapes first, and of the others any, whatever is not answered. */
 static collide_status any_hit(const collide_world *world, collide_workspace *space, const int64_t *keys, size_t n, int *hit)
 {
-    collide_status status = COLLIDE_OK;
-    size_t first, k;
-    for (first = 0; first < n && !*hit && status == COLLIDE_OK; first += BLOCK) {
-        size_t some = n - first < BLOCK ? n - first : BLOCK;
-        status = answer_keys(world, space, keys + first, some, NULL, 1, 0.0);
-        for (k = 0; k < some && status == COLLIDE_OK; k++) *hit |= space->world->hits[k];
+    collide_status status = COLLIDE_OK, first = COLLIDE_OK;
+    size_t k, j, some;
+    for (k = 0; k < n && !*hit && status == COLLIDE_OK; k += some) {
+        if ((some = n_convex(world, keys + k, n - k)) == 0) some = 1;
+        else status = answer_keys(world, space, keys + k, some, NULL, 1, 0.0);
+        for (j = 0; j < some && status == COLLIDE_OK && !is_whole_key(world, keys[k]); j++) *hit |= space->world->hits[j];
     }
-    return status;
+    for (k = 0; k < n && !*hit && status == COLLIDE_OK; k++) {
+        char message[MESSAGE];
+        if (!is_whole_key(world, keys[k])) continue;
+        memcpy(message, space->message, sizeof message);
+        if (whole_meets(world, space, keys[k], space->world->hits) == COLLIDE_OK) *hit = space->world->hits[0];
+        else if (first == COLLIDE_OK) first = COLLIDE_UNSUPPORTED;
+        else memcpy(space->message, message, sizeof message); /* the first that is not answered is named */
+    }
+    if (*hit) space->message[0] = 0;
+    return status != COLLIDE_OK ? status : *hit ? COLLIDE_OK : first;
 }
 
 static collide_status collides(const collide_world *world, collide_workspace *space, int *hit)
@@ -214,26 +242,65 @@ collide_status collide_world_collides(const collide_world *world, collide_worksp
     return status;
 }
 
+collide_status too_many(collide_workspace *space, size_t count, size_t capacity)
+{
+    if (count <= capacity) return COLLIDE_OK;
+    return refuse(space->message, COLLIDE_TOO_MANY, "there are %zu, and room for %zu", count, capacity);
+}
+
+/* The ids of all tested pairs that hit, two a pair. */
+static collide_status pairs_that_hit(const collide_world *world, collide_workspace *space, int32_t *ids, size_t capacity,
+                                     size_t *count)
+{
+    struct world_space *own = space->world;
+    collide_status status = COLLIDE_OK;
+    size_t n, first, k, some;
+    if (!near_pairs(world, own, 0.0, &n)) return no_memory(space);
+    for (first = 0; first < n && status == COLLIDE_OK; first += some) {
+        status = answer_some(world, space, own->keys + first, n - first, 1, 0.0, &some);
+        for (k = 0; k < some && status == COLLIDE_OK; k++) {
+            if (!own->hits[k]) continue;
+            if (*count < capacity) {
+                ids[2 * *count] = world->ids[first_of(own->keys[first + k])];
+                ids[2 * *count + 1] = world->ids[second_of(own->keys[first + k])];
+            }
+            ++*count;
+        }
+    }
+    return status == COLLIDE_OK ? too_many(space, *count, capacity) : status;
+}
+
+collide_status collide_world_hits(const collide_world *world, collide_workspace *workspace, int32_t *ids, size_t capacity,
+                                  size_t *count)
+{
+    int is_good = count != NULL && (capacity == 0 || ids != NULL);
+    collide_status status = check_question(world, workspace, "collide_world_hits", is_good, "ids or count is NULL");
+    rounding given;
+    if (count != NULL) *count = 0;
+    if (status != COLLIDE_OK) return status;
+    given = round_as_kernels_do();
+    status = pairs_that_hit(world, workspace, ids, capacity, count);
+    round_as_before(given);
+    return status;
+}
+
 /* Rows of all tested pairs within a limit, those that hit alone or all that are not proven to be farther. */
 static collide_status rows_within(const collide_world *world, collide_workspace *space, double limit, int hits_alone,
                                   collide_pair *rows, size_t capacity, size_t *count)
 {
     struct world_space *own = space->world;
     collide_status status = COLLIDE_OK;
-    size_t n, first, k;
+    size_t n, first, k, some;
     if (!near_pairs(world, own, limit, &n)) return no_memory(space);
-    for (first = 0; first < n && status == COLLIDE_OK; first += BLOCK) {
-        size_t some = n - first < BLOCK ? n - first : BLOCK;
-        status = answer_keys(world, space, own->keys + first, some, NULL, 0, limit);
+    for (first = 0; first < n && status == COLLIDE_OK; first += some) {
+        status = answer_some(world, space, own->keys + first, n - first, 0, limit, &some);
         for (k = 0; k < some && status == COLLIDE_OK; k++) {
             if (hits_alone ? !own->rows[k].hit : own->rows[k].lower > limit) continue;
             if (*count < capacity) rows[*count] = own->rows[k];
             ++*count;
         }
     }
-    if (status == COLLIDE_OK && *count > capacity)
-        return refuse(space->message, COLLIDE_TOO_MANY, "%zu rows, and room for %zu", *count, capacity);
-    return status;
+    return status == COLLIDE_OK ? too_many(space, *count, capacity) : status;
 }
 
 static collide_status ask_rows(const collide_world *world, collide_workspace *space, const char *caller, double limit,
@@ -310,7 +377,10 @@ static collide_status look_among(const collide_world *world, collide_workspace *
     while (first < n && candidates[first].bound <= (best->distance < limit ? best->distance : limit)) {
         double twice = 2.0 * best->distance, reach = twice < limit ? twice : limit;
         collide_status status;
-        for (some = 0; some < size && first + some < n; some++) keys[some] = candidates[first + some].key;
+        for (some = 0; some < size && first + some < n; some++) {
+            keys[some] = candidates[first + some].key;
+            if (is_whole_key(world, keys[some])) return refuse_pair(world, space, keys[some], COLLIDE_UNSUPPORTED);
+        }
         status = answer_keys(world, space, keys, some, NULL, 0, reach > 0.0 ? reach : 0.0);
         if (status != COLLIDE_OK) return status;
         for (k = 0; k < some; k++) {
@@ -403,7 +473,9 @@ collide_status collide_world_contacts(const collide_world *world, collide_worksp
     given = round_as_kernels_do();
     if (!near_pairs(world, own, margin, &n)) status = no_memory(workspace);
     for (k = 0; k < n && status == COLLIDE_OK; k++) {
-        status = contacts_of_key(world, workspace, own->keys[k], margin, max_contacts, &some);
+        status = is_whole_key(world, own->keys[k])
+                     ? COLLIDE_UNSUPPORTED
+                     : contacts_of_key(world, workspace, own->keys[k], margin, max_contacts, &some);
         if (status != COLLIDE_OK) refuse_pair(world, workspace, own->keys[k], status);
         for (j = 0; j < some && status == COLLIDE_OK; j++, ++*count) {
             own->contacts[j].a = world->ids[first_of(own->keys[k])];
@@ -412,7 +484,5 @@ collide_status collide_world_contacts(const collide_world *world, collide_worksp
         }
     }
     round_as_before(given);
-    if (status == COLLIDE_OK && *count > capacity)
-        return refuse(workspace->message, COLLIDE_TOO_MANY, "%zu contacts, and room for %zu", *count, capacity);
-    return status;
+    return status == COLLIDE_OK ? too_many(workspace, *count, capacity) : status;
 }

@@ -531,10 +531,12 @@ COLLIDE_API collide_status collide_point_cloud_within(const collide_field *cloud
 
 /* --- worlds ----------------------------------------------------------------------------------------------------------
 
-   Many bodies, a tree over their boxes, and questions about all of them: the answers of Python's World, row by row and bit by bit.
-   Bodies are convex shapes. A change takes its time in the call that makes it: a step moves bodies, and the tree follows.
-   Questions change nothing: any number of threads may ask a world at once, each with its own workspace, while nobody changes it.
-   Shapes are not copied: free a shape once no body has it any more.
+   Many bodies, a tree over their boxes, and questions about all of them: the answers of Python's World, row by row and bit by
+   bit. Bodies are convex shapes; meshes and fields as well, of which a world says what the pair queries above say: whether they
+   hit, and gaps. What these do not answer is COLLIDE_UNSUPPORTED, and the message names the bodies. A change takes its time in
+   the call that makes it: a step moves bodies, and the tree follows. Questions change nothing: any number of threads may ask a
+   world at once, each with its own workspace, while nobody changes it. Shapes, meshes and fields are not copied: free them once
+   no body is made of them.
 
    A pair of bodies is tested unless both are static or asleep, their groups and masks exclude each other (tested when
    (group_A & mask_B) and (group_B & mask_A)), or `collide_world_allow` names the pair.
@@ -560,13 +562,15 @@ COLLIDE_API const char *collide_workspace_message(const collide_workspace *works
 /* A body as it is added. Begin with COLLIDE_BODY_DEFAULT: later versions may have more fields, behind these. */
 typedef struct collide_body {
     size_t size;                /* sizeof(collide_body) */
-    const collide_shape *shape;
+    const collide_shape *shape; /* of shape, mesh and field one is not NULL */
+    const collide_mesh *mesh;
+    const collide_field *field;
     const double *X_WB;         /* its pose in the world, 16 doubles; NULL: the identity */
     int is_static;              /* never tested against other static bodies */
     uint32_t group, mask;       /* bit sets: the groups of the body, and the groups to test it against */
 } collide_body;
 
-#define COLLIDE_BODY_DEFAULT {sizeof(collide_body), NULL, NULL, 0, 1u, 0xFFFFu}
+#define COLLIDE_BODY_DEFAULT {sizeof(collide_body), NULL, NULL, NULL, NULL, 0, 1u, 0xFFFFu}
 
 /* Add n bodies; ids[k] becomes the id of bodies[k], ascending, never used again in this world. O(log n) a body, or less of many
    at once. Where one of them is bad none is added. */
@@ -581,6 +585,8 @@ COLLIDE_API collide_status collide_world_move(collide_world *world, const int32_
 
 /* Give a body another shape; its id, pose, filters and sleep stay. */
 COLLIDE_API collide_status collide_world_replace(collide_world *world, int32_t id, const collide_shape *shape);
+COLLIDE_API collide_status collide_world_replace_mesh(collide_world *world, int32_t id, const collide_mesh *mesh);
+COLLIDE_API collide_status collide_world_replace_field(collide_world *world, int32_t id, const collide_field *field);
 
 /* Put bodies to sleep (asleep 1) or wake them (0): a pair of two bodies asleep or static is not tested. */
 COLLIDE_API collide_status collide_world_sleep(collide_world *world, const int32_t *ids, size_t n, int asleep);
@@ -594,8 +600,12 @@ COLLIDE_API size_t collide_world_size(const collide_world *world);
 /* The pose of a body, as it was handed in. */
 COLLIDE_API collide_status collide_world_pose(const collide_world *world, int32_t id, double X_WB[16]);
 
-/* Whether any tested pair hits; stops at the first hit. */
+/* Whether any tested pair hits; stops at the first hit. COLLIDE_UNSUPPORTED: no pair that is answered does, and one is not. */
 COLLIDE_API collide_status collide_world_collides(const collide_world *world, collide_workspace *workspace, int *hit);
+
+/* Every tested pair that hits, by booleans alone: two ids a pair, sorted. capacity : of pairs. */
+COLLIDE_API collide_status collide_world_hits(const collide_world *world, collide_workspace *workspace, int32_t *ids,
+                                              size_t capacity, size_t *count);
 
 /* Every tested pair that hits, with its depth: rows sorted by (a, b), the ids of the bodies, a < b. Of two half-spaces that
    overlap the distance is minus infinity. */

@@ -14,13 +14,20 @@ from collide.casts.ray_hits import WORLD_HIT_DTYPE
 from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.results import PAIR_DTYPE
 
+Geometry = c.CShape | c.CMesh | c.CField
+
+
+def _geometry(shape: Geometry) -> tuple[int | None, int | None, int | None]:
+    """Handles of a shape, a mesh, a field: of what a body is, and None of the others."""
+    return tuple(shape.handle if isinstance(shape, kind) else None for kind in (c.CShape, c.CMesh, c.CField))
+
 
 class CBody(ctypes.Structure):
     """`collide_body`."""
 
     _fields_ = [
-        ("size", c_size_t), ("shape", c_void_p), ("X_WB", c_void_p), ("is_static", c_int), ("group", c_uint32),
-        ("mask", c_uint32),
+        ("size", c_size_t), ("shape", c_void_p), ("mesh", c_void_p), ("field", c_void_p), ("X_WB", c_void_p),
+        ("is_static", c_int), ("group", c_uint32), ("mask", c_uint32),
     ]
 
 
@@ -50,7 +57,7 @@ class CWorld:
 
     # --- changes --------------------------------------------------------------------------------
 
-    def add(self, shape: c.CShape, X_WB, static: bool = False, group: int = 1, mask: int = 0xFFFF) -> tuple[int, int]:
+    def add(self, shape: Geometry, X_WB, static: bool = False, group: int = 1, mask: int = 0xFFFF) -> tuple[int, int]:
         """(status, id)."""
         status, ids = self.add_many([(shape, X_WB, static, group, mask)])
         return status, ids[0]
@@ -59,7 +66,7 @@ class CWorld:
         """(status, ids) of bodies (shape, X_WB, static, group, mask)."""
         held = [np.ascontiguousarray(X, dtype=np.float64) for _, X, *_ in bodies]
         made = (CBody * len(bodies))(*(
-            CBody(ctypes.sizeof(CBody), shape.handle, X.ctypes.data, static, group, mask)
+            CBody(ctypes.sizeof(CBody), *_geometry(shape), X.ctypes.data, static, group, mask)
             for (shape, _, static, group, mask), X in zip(bodies, held)
         ))
         ids = np.full(len(bodies), -7, dtype=np.int32)
@@ -72,8 +79,9 @@ class CWorld:
         ids, X_WBs = np.ascontiguousarray(ids, dtype=np.int32), np.ascontiguousarray(X_WBs, dtype=np.float64)
         return self._library.collide_world_move(self.handle, ids.ctypes.data, len(ids), X_WBs.ctypes.data)
 
-    def replace(self, identity: int, shape: c.CShape) -> int:
-        return self._library.collide_world_replace(self.handle, identity, shape.handle)
+    def replace(self, identity: int, shape: Geometry) -> int:
+        kind = {c.CShape: "", c.CMesh: "_mesh", c.CField: "_field"}[type(shape)]
+        return getattr(self._library, f"collide_world_replace{kind}")(self.handle, identity, shape.handle)
 
     def sleep(self, ids, asleep: bool) -> int:
         ids = np.ascontiguousarray(ids, dtype=np.int32)
@@ -95,6 +103,11 @@ class CWorld:
 
     def collisions(self, asker: c.Asker | None = None, capacity: int | None = None):
         return self._rows(self._library.collide_world_collisions, PAIR_DTYPE, capacity, self._of(asker))
+
+    def hits(self, asker: c.Asker | None = None, capacity: int | None = None):
+        """(status, (k, 2) ids of pairs that hit)."""
+        dtype = np.dtype((np.int32, 2))
+        return self._rows(self._library.collide_world_hits, dtype, capacity, self._of(asker))
 
     def distances(self, limit: float = math.inf, asker: c.Asker | None = None, capacity: int | None = None):
         return self._rows(self._library.collide_world_distances, PAIR_DTYPE, capacity, self._of(asker), limit)
