@@ -206,9 +206,12 @@ static collide_status any_hit(const collide_world *world, collide_workspace *spa
         char message[MESSAGE];
         if (!is_whole_key(world, keys[k])) continue;
         memcpy(message, space->message, sizeof message);
-        if (whole_meets(world, space, keys[k], space->world->hits) == COLLIDE_OK) *hit = space->world->hits[0];
-        else if (first == COLLIDE_OK) first = COLLIDE_UNSUPPORTED;
-        else memcpy(space->message, message, sizeof message); /* the first that is not answered is named */
+        status = whole_meets(world, space, keys[k], space->world->hits);
+        if (status == COLLIDE_OK) *hit = space->world->hits[0];
+        if (status != COLLIDE_UNSUPPORTED) continue;
+        if (first != COLLIDE_OK) memcpy(space->message, message, sizeof message); /* the first that is not answered is named */
+        first = status;
+        status = COLLIDE_OK;
     }
     if (*hit) space->message[0] = 0;
     return status != COLLIDE_OK ? status : *hit ? COLLIDE_OK : first;
