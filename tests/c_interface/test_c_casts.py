@@ -118,7 +118,7 @@ def test_what_slides_over_a_floor_is_decided(integers):
     asker, slid, refused = c.Asker(), 0, 0
     for number in range(200):
         random = np.random.default_rng([94, number])
-        normal = random.integers(-3, 4, 3).astype(float) + [0, 0, 4]
+        normal = random.integers(-3, 4, 3) + np.array((0.0, 0.0, 4.0))
         floor, X_WB = collide.Halfspace(normal, 0.0), soak_pairs.rotation(random)
         if np.count_nonzero(X_WB[:3, :3]) != 3:
             X_WB = np.eye(4)
