@@ -11,12 +11,12 @@ import hashlib
 import importlib.util
 import json
 import os
-import platform
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import platforms
 from setuptools import build_meta
 from setuptools.build_meta import *
 
@@ -24,8 +24,8 @@ ROOT = Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "emitted"
 #: What compiles kernels: the versions that were tested.
 COMPILERS = ["numba==0.68.1", "llvmlite==0.50.0"]
-#: Platforms whose objects travel, and what LLVM calls them.
-EMITTED = {"linux-x86_64": "x86_64-unknown-linux-gnu", "linux-aarch64": "aarch64-unknown-linux-gnu"}
+#: Platforms whose objects travel.
+EMITTED = ("linux-x86_64", "linux-aarch64")
 
 
 def get_requires_for_build_wheel(config_settings=None) -> list[str]:
@@ -43,7 +43,7 @@ def get_requires_for_build_sdist(config_settings=None) -> list[str]:
 def build_sdist(sdist_directory, config_settings=None) -> str:
     try:
         if emitted() is None:
-            _emit()
+            emit()
         return build_meta.build_sdist(sdist_directory, config_settings)
     finally:
         if (ROOT / ".git").exists():  # in a checkout the next edit would make them stale
@@ -51,17 +51,20 @@ def build_sdist(sdist_directory, config_settings=None) -> str:
 
 
 def _compilers() -> list[str]:
-    unwanted = os.environ.get("COLLIDE_NO_LIBRARY", "0") not in ("", "0")
-    return [] if unwanted or emitted() is not None else COMPILERS
+    if os.environ.get("COLLIDE_NO_LIBRARY", "0") not in ("", "0"):
+        return []
+    of_kernels = [] if emitted() is not None else COMPILERS
+    return [*of_kernels, platforms.ZIG] if platforms.needs_zig(platforms.chosen()) else of_kernels
 
 
-def _emit() -> None:
-    """Object files of all platforms' levels in `FOLDER`, and what is known of them."""
+def emit(names: tuple[str, ...] = EMITTED, levels: str = "all") -> None:
+    """Object files of platforms' levels in `FOLDER`, and what is known of them.   levels : as in ``COLLIDE_LEVELS``."""
     FOLDER.mkdir(exist_ok=True)
     about: dict = {"platforms": {}}
-    for name, triple in EMITTED.items():
-        command = [sys.executable, str(ROOT / "native" / "compile_kernels.py"), "--json", "--levels", "all"]
-        done = subprocess.run([*command, "--triple", triple], stdout=subprocess.PIPE, check=True, cwd=ROOT)
+    for name in names:
+        command = [sys.executable, str(ROOT / "native" / "compile_kernels.py"), "--json", "--levels", levels]
+        command += ["--triple", platforms.PLATFORMS[name].triple]
+        done = subprocess.run(command, stdout=subprocess.PIPE, check=True, cwd=ROOT)
         made = json.loads(done.stdout)
         about["platforms"][name] = {
             level: [[_kept(Path(place)), _digest(Path(place))] for place in places]
@@ -88,7 +91,7 @@ def emitted(levels: str = "") -> dict | None:
     """
     try:
         about = json.loads((FOLDER / "about.json").read_text(encoding="utf-8"))
-        of_levels = about["platforms"][f"{sys.platform}-{platform.machine().lower()}"]
+        of_levels = about["platforms"][platforms.chosen().name]
         wanted = list(of_levels) if levels in ("", "all") else levels.replace(",", " ").split()
         files = {level: of_levels[level] for level in wanted}
         sound = all(_digest(FOLDER / name) == known for pairs in files.values() for name, known in pairs)

@@ -1,11 +1,13 @@
 """`build_ext` of setuptools: kernels to object files, those and C to libcollide, and its Python module.
 
-Where there is no C compiler, or it cannot link, the package is installed without a library, and then needs numba and
-compiles kernels at their first call. ``COLLIDE_REQUIRE_COMPILED=1``, as for releases, makes that an error.
+Where there is no C compiler, or it cannot link, the compiler of the package ziglang takes its place
+(`platforms.py`). Without either the package is installed without a library, and then needs numba and compiles kernels
+at their first call. ``COLLIDE_REQUIRE_COMPILED=1``, as for releases, makes that an error.
 
     COLLIDE_REQUIRE_COMPILED=1    no library, no installation
     COLLIDE_LEVELS="v3 v4"        these levels of processors, or "all", as for releases; by default this machine's alone
     COLLIDE_NO_LIBRARY=1          none, on purpose: a pure wheel
+    COLLIDE_PLATFORM=NAME         for another platform: `platforms.py`
 """
 
 from __future__ import annotations
@@ -16,7 +18,6 @@ import shutil
 import subprocess
 import sys
 import sysconfig
-import tempfile
 import zlib
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -24,6 +25,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import backend
 import describe_kernels
+import platforms
 from compile_kernels import say
 from setuptools import Extension
 from setuptools.command.build_ext import build_ext
@@ -47,8 +49,8 @@ C_SOURCES = [
 ]
 #: Headers of programs that use it.
 HEADERS = ["collide.h", "collide.hpp"]
-WINDOWS, MACOS = sys.platform == "win32", sys.platform == "darwin"
-LIBRARY = "collide.dll" if WINDOWS else "libcollide.dylib" if MACOS else "libcollide.so"
+#: What is built for.
+FOR = platforms.chosen()
 
 
 def _asked(name: str) -> bool:
@@ -57,16 +59,11 @@ def _asked(name: str) -> bool:
 
 def why_not() -> str:
     """Why no library can be made here; empty where one can. Raises SystemExit where one was required."""
-    if sysconfig.get_config_var("Py_GIL_DISABLED"):
-        raise SystemExit(
-            "collide: free-threaded builds of Python are not supported; "
-            "use a build with the lock (python3.14, not 3.14t)"
-        )
-    reason = "COLLIDE_NO_LIBRARY is set" if _asked("COLLIDE_NO_LIBRARY") else _cannot_link()
+    reason = "COLLIDE_NO_LIBRARY is set" if _asked("COLLIDE_NO_LIBRARY") else platforms.why_no_compiler(FOR)
     if reason and _asked("COLLIDE_REQUIRE_COMPILED"):
         raise SystemExit(
             f"collide: kernels cannot be built: {reason}\nCOLLIDE_REQUIRE_COMPILED is set, so this is an error. "
-            "Install a C compiler: "
+            f"Install a C compiler: pip install {platforms.ZIG}, "
             "apt install gcc, dnf install gcc, xcode-select --install, or the Build Tools of Visual Studio"
         )
     if reason:
@@ -78,56 +75,36 @@ def why_not() -> str:
     return reason
 
 
-def _cannot_link() -> str:
-    """What goes wrong when a shared library of one line is made; empty where nothing does."""
-    from distutils.ccompiler import new_compiler  # setuptools' own
-    from distutils.sysconfig import customize_compiler
-
-    compiler = new_compiler()
-    customize_compiler(compiler)
-    with tempfile.TemporaryDirectory() as folder:
-        source = Path(folder) / "probe.c"
-        source.write_text("int collide_probe(void) { return 1; }\n", encoding="utf-8")
-        quiet = os.open(os.devnull, os.O_WRONLY), os.dup(2)
-        try:
-            os.dup2(quiet[0], 2)
-            objects = compiler.compile([str(source)], output_dir=folder)
-            compiler.link_shared_object(objects, str(Path(folder) / "probe.so"))
-        except Exception as error:  # noqa: BLE001 - whatever a compiler's absence looks like here
-            tool = (getattr(compiler, "compiler_so", None) or ["the C compiler"])[0]
-            return (
-                f"no C compiler or linker ({tool}: "
-                f"{str(error).splitlines()[0] if str(error) else type(error).__name__})"
-            )
-        finally:
-            os.dup2(quiet[1], 2)
-            for handle in quiet:
-                os.close(handle)
-    return ""
-
-
 def extension() -> Extension:
     """What makes wheels those of a platform; `BuildLibrary` knows what is in it."""
-    return Extension("collide.kernels._glue", [], py_limited_api=True)
+    return Extension("collide.kernels._glue", [], py_limited_api=bool(platforms.interface().wheel))
 
 
 class BuildLibrary(build_ext):
     """Makes the library, its Python module, and what tells of them, where setuptools collects the package's files."""
 
     def build_extension(self, ext) -> None:
-        made = _compiled_kernels()
+        if self.by_zig:
+            say(f"C is compiled for {FOR.name} by the package ziglang")
+            self.compiler = platforms.zig_compiler(FOR)
+        made = _compiled_kernels(FOR.triple if self.by_zig else "")
         generated = BUILD / "generated"
         _generate(generated, made["entries"], list(made["objects"]))
-        place = Path(self.build_lib) / "collide"
-        library, module = place / "lib" / LIBRARY, Path(self.get_ext_fullpath(ext.name))
+        place, python = Path(self.build_lib) / "collide", platforms.interface()
+        library, module = place / "lib" / FOR.library, place / "kernels" / f"_glue{python.suffix}"
         for folder in (library.parent, module.parent):
             folder.mkdir(parents=True, exist_ok=True)
-        say(f"linking {LIBRARY}")
+        say(f"linking {FOR.library}")
         kernels = [file for files in made["objects"].values() for file in files]
         self._link([*self._compiled(C_SOURCES, generated), *kernels], library, _exported())
-        self._link(self._compiled(["python_module.c"], generated), module, ["PyInit__glue"], calls_python=True)
+        objects = self._compiled(["python_module.c"], generated, *([f"-D{python.macro}"] if python.macro else []))
+        self._link(objects, module, ["PyInit__glue"], calls_python=True)
         self._write_interface(place)
         _write_about(place, [library, module], made)
+
+    @property
+    def by_zig(self) -> bool:
+        return platforms.uses_zig(FOR)
 
     def copy_extensions_to_source(self) -> None:
         """For editable installations: the same files in the checkout."""
@@ -159,7 +136,7 @@ class BuildLibrary(build_ext):
         """What programs in C need beside the library: headers, and files by which pkg-config and CMake find both."""
         places = {"collide.pc": "pkgconfig", "collideConfig.cmake": "cmake/collide"}
         places["collideConfigVersion.cmake"] = places["collideConfig.cmake"]
-        filled = {"@VERSION@": self.distribution.get_version(), "@LIBRARY@": LIBRARY}
+        filled = {"@VERSION@": self.distribution.get_version(), "@LIBRARY@": FOR.library}
         (place / "include").mkdir(parents=True, exist_ok=True)
         for header in HEADERS:
             shutil.copy(NATIVE / header, place / "include")
@@ -170,16 +147,18 @@ class BuildLibrary(build_ext):
             (place / "lib" / folder).mkdir(parents=True, exist_ok=True)
             (place / "lib" / folder / name).write_text(text, encoding="utf-8")
 
-    def _compiled(self, names: list[str], generated: Path) -> list[str]:
+    def _compiled(self, names: list[str], generated: Path, *more: str) -> list[str]:
         """Object files of modules of C, each kept under a hash of all that it is made from."""
         import numpy
 
         flags = (
             ["/O2"]
-            if WINDOWS
+            if self._is_msvc
             else ["-O2", "-g0", "-std=c99", "-ffp-contract=off", "-fvisibility=hidden", f"-ffile-prefix-map={ROOT}=."]
         )
-        include = [str(generated), str(NATIVE), numpy.get_include(), sysconfig.get_path("include")]
+        flags += more
+        include = [str(generated), str(NATIVE), *filter(None, os.environ.get("COLLIDE_INCLUDE", "").split(os.pathsep))]
+        include += [numpy.get_include(), sysconfig.get_path("include")]
         headers = sorted([*NATIVE.glob("*.h"), *generated.iterdir()])
         common = hashlib.sha256(repr((flags, include, numpy.__version__, sys.version, self._c_compiler())).encode())
         for header in headers:
@@ -208,34 +187,42 @@ class BuildLibrary(build_ext):
         command = getattr(self.compiler, "compiler_so", None)
         if not command:
             return self.compiler.compiler_type  # of Windows: whose version is that of the build's environment
-        asked = [*command[:1], "--version"]
+        asked = [*self._c_command, "--version"]
         return repr(command) + subprocess.run(asked, stdout=subprocess.PIPE, check=True, text=True).stdout
+
+    @property
+    def _is_msvc(self) -> bool:
+        return FOR.system == "win32" and not self.by_zig
+
+    @property
+    def _c_command(self) -> list[str]:
+        return FOR.zig() if self.by_zig else self.compiler.compiler_so[:1]
 
     def _link(self, objects: list[str], out: Path, exported: list[str], calls_python: bool = False) -> None:
         """A shared library that leaves nothing open but the C library's functions, and Python's where it calls them.
 
         Not as Python links its modules: that writes paths of this machine into them.
         """
-        if WINDOWS:
+        if self._is_msvc:
             names = [f"/EXPORT:{name}" for name in exported]
             names += [] if calls_python else [f"/IMPLIB:{out.with_suffix('.lib')}"]
             self.compiler.link_shared_object(objects, str(out), extra_postargs=names)
             return
-        compiler = self.compiler.compiler_so[0]
-        if MACOS:
-            kind = (
-                ["-bundle", "-undefined", "dynamic_lookup"]
-                if calls_python
-                else ["-dynamiclib", "-install_name", f"@rpath/{LIBRARY}"]
-            )
-            self.spawn([compiler, *kind, "-o", str(out), *objects])
+        strip = [] if os.environ.get("COLLIDE_SYMBOLS") else ["-s"]
+        if FOR.system == "darwin":
+            of_python = ["-undefined", "dynamic_lookup", *([] if self.by_zig else ["-bundle"])]
+            kind = of_python if calls_python else ["-install_name", f"@rpath/{FOR.library}"]
+            kind += ["-dynamiclib"] if "-bundle" not in kind else []
+        elif FOR.system == "win32":
+            python = self._python_library(objects) if calls_python else f"-Wl,--out-implib,{out.with_suffix('.lib')}"
+            kind = ["-shared", *strip, python]
         else:
-            kind = ["-ldl"] if calls_python else ["-lm", "-Wl,-z,defs", f"-Wl,-soname,{LIBRARY}"]
-            strip = [] if os.environ.get("COLLIDE_SYMBOLS") else ["-s"]
-            self.spawn([compiler, "-shared", *strip, "-Wl,-z,relro", "-o", str(out), *objects, *kind])
+            of_python = ["-ldl"] if calls_python else ["-lm", "-Wl,-z,defs", f"-Wl,-soname,{FOR.library}"]
+            kind = ["-shared", *strip, "-Wl,-z,relro", *of_python]
+        self.spawn([*self._c_command, "-o", str(out), *objects, *kind])
 
 
-def _compiled_kernels() -> dict:
+def _compiled_kernels(triple: str) -> dict:
     """As they came with the source archive, or as `compile_kernels.compile_kernels` makes them, in a process of its
     own: it imports the package."""
     import json
@@ -244,7 +231,7 @@ def _compiled_kernels() -> dict:
     if (ready := backend.emitted(levels)) is not None:
         return ready
     command = [sys.executable, str(NATIVE / "compile_kernels.py"), "--out", str(BUILD), "--levels", levels, "--json"]
-    done = subprocess.run(command, stdout=subprocess.PIPE, check=False)
+    done = subprocess.run([*command, "--triple", triple], stdout=subprocess.PIPE, check=False)
     if done.returncode:
         raise SystemExit("collide: kernels could not be compiled: see above")
     return json.loads(done.stdout)

@@ -4,6 +4,8 @@
     python tests/golden.py --part 2/6     # the second sixth of the families
     python tests/golden.py --write        # after a change that is meant: a commit of its own that says which rows
     moved, and why
+    python tests/golden.py --keep FILE    # questions and answers themselves, for another machine or another Python:
+    python tests/golden.py --against FILE # asks the questions of the file; tells where bytes differ, and numbers
 
 A group is a kind of question about one family of pairs, in one way of asking. Inputs are hashed as well: they come from
 random generators and from the C library's sines, and where they are others the answers cannot be compared.
@@ -15,7 +17,9 @@ import argparse
 import hashlib
 import itertools
 import json
+import math
 import os
+import pickle
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -34,6 +38,8 @@ FILE = Path(__file__).with_name("golden.json")
 #: Cases of a family, and random pairs of all kinds of shapes.
 EACH, DRAWN = 3, 240
 SEED = 19
+#: How far numbers of two machines may differ.
+ROUNDING = 2.0**-40
 
 
 class Pair(NamedTuple):
@@ -64,11 +70,12 @@ class Digest:
     def text(self) -> str:
         return self._sha.hexdigest()[:16]
 
-
-def hashed(*values) -> str:
-    digest = Digest()
-    digest.add(values)
-    return digest.text()
+    @classmethod
+    def of(cls, answers: list) -> str:
+        """Of a list of answers."""
+        digest = cls()
+        digest.add(answers)
+        return digest.text()
 
 
 # --- pairs --------------------------------------------------------------------------------------
@@ -187,27 +194,103 @@ def _in_a_list(pairs: list[Pair]) -> Iterator:
         yield _answer(ask)
 
 
+def answered(pairs: list[Pair]) -> Iterator[tuple[str, list]]:
+    """(way of asking, answers) of a family."""
+    for way, answers in WAYS.items():
+        yield way, [list(answers(pair)) for pair in pairs]
+    yield "list and World", list(_in_a_list(pairs))
+
+
 def groups(part: int = 0, parts: int = 1) -> Iterator[tuple[str, str, str]]:
     """(name, hash of the questions, hash of the answers) of every ``parts``-th family."""
     for family, pairs in itertools.islice(families(), part, None, parts):
         asked = _asked_of(pairs)
-        for way, answers in WAYS.items():
-            digest = Digest()
-            for pair in pairs:
-                digest.add(list(answers(pair)))
-            yield f"{family}: {way}", asked, digest.text()
-        yield f"{family}: list and World", asked, hashed(*_in_a_list(pairs))
+        for way, answers in answered(pairs):
+            yield f"{family}: {way}", asked, Digest.of(answers)
+
+
+# --- two machines -------------------------------------------------------------------------------
+
+
+def keep(file: Path, part: int, parts: int) -> None:
+    """Questions and answers themselves."""
+    chosen = itertools.islice(families(), part, None, parts)
+    kept = {family: (pairs, dict(answered(pairs))) for family, pairs in chosen}
+    file.write_bytes(pickle.dumps(kept))
+    print(f"{len(kept)} families kept")
+
+
+def against(file: Path, part: int, parts: int) -> bool:
+    """Whether this machine answers the questions of a file as the file does: texts, integers and booleans without
+    exception, numbers bit by bit or within `ROUNDING`, which takes products of matrices by another BLAS."""
+    kept = pickle.loads(file.read_bytes())
+    equal, others = 0, []
+    for family, (pairs, known) in itertools.islice(kept.items(), part, None, parts):
+        for way, answers in answered(pairs):
+            if Digest.of(answers) == Digest.of(known[way]):
+                equal += 1
+                continue
+            others.append(_difference(list(_leaves(answers)), list(_leaves(known[way]))))
+            print(f"{family}: {way}: numbers differ by {others[-1]:.2g}", flush=True)
+    far = sum(difference > ROUNDING for difference in others)
+    print(f"{equal} groups with equal bytes, {len(others) - far} with equal values but for rounding, {far} with others")
+    return bool(equal) and not far
+
+
+def _leaves(value) -> Iterator:
+    """Arrays, also of records, and texts."""
+    if isinstance(value, (list, tuple)):
+        for one in value:
+            yield from _leaves(one)
+    else:
+        yield np.asarray(value)
+
+
+def _difference(found: list, known: list) -> float:
+    """How far numbers differ, in metres or in units of their own sizes, whichever are larger; infinite where anything
+    else differs."""
+    if [(one.shape, one.dtype.names) for one in found] != [(one.shape, one.dtype.names) for one in known]:
+        return math.inf
+    return max(map(_apart, found, known), default=0.0)
+
+
+def _apart(one: np.ndarray, other: np.ndarray) -> float:
+    """`_difference` of two arrays of a shape. Rows with a wide proven interval, as the depths of compounds have, are
+    answers of a search: the intervals must meet."""
+    if one.dtype.names:
+        if {"lower", "upper", "hit"} <= {*one.dtype.names}:
+            if (one["lower"] > other["upper"]).any() or (other["lower"] > one["upper"]).any():
+                return math.inf
+            wide = (one["upper"] - one["lower"] > ROUNDING) & (other["upper"] - other["lower"] > ROUNDING)
+            if (one["hit"] != other["hit"]).any():
+                return math.inf
+            one, other = one[~wide], other[~wide]
+        return max(_apart(one[name], other[name]) for name in one.dtype.names)
+    if np.array_equal(one, other, equal_nan=one.dtype.kind == other.dtype.kind == "f"):
+        return 0.0
+    if one.dtype.kind != "f" or other.dtype.kind != "f" or (np.isnan(one) != np.isnan(other)).any():
+        return math.inf
+    differ = ~(np.isnan(one) | (one == other))
+    one, other = one[differ], other[differ]
+    return float(np.nan_to_num(np.abs(one - other) / np.maximum(1.0, np.abs(other)), nan=math.inf).max())
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--write", action="store_true", help="keep what the engine answers now")
     parser.add_argument("--part", default="1/1", metavar="K/N", help="the K-th of N parts of the families")
+    parser.add_argument("--keep", type=Path, metavar="FILE", help="write questions and answers, for --against")
+    parser.add_argument("--against", type=Path, metavar="FILE", help="ask the questions of a file, compare the answers")
     given = parser.parse_args()
     part, parts = (int(number) for number in given.part.split("/"))
     if not 1 <= part <= parts or (given.write and parts > 1):
         parser.error(f"--part: {given.part} is no part of all families, or written by itself")
     sys.path[:0] = [str(Path(__file__).with_name(folder)) for folder in ("soak", "oracles")]
+    if given.keep is not None:
+        keep(given.keep, part - 1, parts)
+        return
+    if given.against is not None:
+        sys.exit(not against(given.against, part - 1, parts))
     found = {name: [asked, told] for name, asked, told in groups(part - 1, parts)}
     if given.write:
         FILE.write_text(json.dumps(found, indent=0) + "\n", encoding="utf-8")

@@ -64,6 +64,20 @@ def test_levels_are_this_machines_alone_where_none_is_named(native):
     assert compile_kernels.levels_of(elsewhere) == compile_kernels.levels_of(elsewhere, "all")
 
 
+def test_platforms_are_those_of_the_table_and_the_compiler_is_that_of_the_extra(native, monkeypatch):
+    backend, _ = native
+    platforms = backend.platforms
+    for name, known in platforms.PLATFORMS.items():
+        monkeypatch.setenv("COLLIDE_PLATFORM", name)
+        assert platforms.chosen() is known and known.target in known.zig()
+        assert platforms.needs_zig(known) and known.options()["bdist_wheel"]["plat_name"] == known.tag
+    monkeypatch.setenv("COLLIDE_PLATFORM", "plan9-x86_64")
+    with pytest.raises(SystemExit, match="'plan9-x86_64' is no platform; it may be linux-x86_64, linux-aarch64"):
+        platforms.chosen()
+    monkeypatch.delenv("COLLIDE_PLATFORM")
+    assert f'machines = ["{platforms.ZIG}"]' in (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+
+
 def test_a_level_that_is_none_is_refused_by_name(native):
     with pytest.raises(SystemExit, match="'v9' is no level of x86_64; it has v2, v3, v4, and all"):
         native[1].levels_of(X86_64, "v9")

@@ -186,8 +186,15 @@ def test_same_sources_give_the_same_bytes(wheel_file, tmp_path):
     assert (again / "dist" / wheel_file.name).read_bytes() == wheel_file.read_bytes()
 
 
-def test_without_a_compiler_the_wheel_needs_numba_and_says_so(tmp_path):
-    done = _built(tmp_path / "tree", CC=str(tmp_path / "no-such-compiler"))
+@pytest.fixture()
+def without_compilers(tmp_path) -> dict[str, str]:
+    """An environment with neither a C compiler nor the package ziglang."""
+    (tmp_path / "sitecustomize.py").write_text("import sys\nsys.modules['ziglang'] = None\n", encoding="utf-8")
+    return {"CC": str(tmp_path / "no-such-compiler"), "PYTHONPATH": str(tmp_path)}
+
+
+def test_without_a_compiler_the_wheel_needs_numba_and_says_so(tmp_path, without_compilers):
+    done = _built(tmp_path / "tree", **without_compilers)
     assert done.returncode == 0, done.stdout + done.stderr
     (line,) = (line for line in done.stderr.splitlines() if "***" in line)
     assert "NO COMPILED KERNELS" in line and "collide doctor" in line and "no-such-compiler" in line
@@ -199,10 +206,29 @@ def test_without_a_compiler_the_wheel_needs_numba_and_says_so(tmp_path):
         assert _required(email.message_from_bytes(opened.read(name))) == ["llvmlite", "numba", "numpy"]
 
 
-def test_releases_never_lack_kernels(tmp_path):
-    done = _built(tmp_path / "tree", CC=str(tmp_path / "no-such-compiler"), COLLIDE_REQUIRE_COMPILED="1")
+def test_releases_never_lack_kernels(tmp_path, without_compilers):
+    done = _built(tmp_path / "tree", **without_compilers, COLLIDE_REQUIRE_COMPILED="1")
     assert done.returncode != 0 and not list((tmp_path / "tree").glob("dist/*.whl"))
     assert "COLLIDE_REQUIRE_COMPILED is set" in done.stderr and "apt install gcc" in done.stderr
+
+
+@pytest.mark.slow
+def test_ziglang_compiles_where_there_is_no_compiler_and_the_wheel_has_the_same_files(tmp_path, wheel):
+    pytest.importorskip("ziglang", reason="the C compiler for others: pip install 'collide-robotics[machines]'")
+    done = _built(tmp_path / "tree", CC=str(tmp_path / "no-such-compiler"))
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "by the package ziglang" in done.stderr and "NO COMPILED KERNELS" not in done.stderr
+    (made,) = (tmp_path / "tree" / "dist").glob("*.whl")
+    with zipfile.ZipFile(made) as opened:
+        assert opened.namelist() == wheel.namelist()
+        opened.extractall(tmp_path / "installed")
+    asked = "import collide, collide.kernels.mode as m; b = collide.Box((1, 1, 1)); "
+    asked += "print(m.describe_mode(), collide.distance(b, b, collide.pose(), collide.pose((2, 0, 0))).distance)"
+    run = subprocess.run(
+        [sys.executable, "-c", asked], cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(tmp_path / "installed")},
+        check=False, capture_output=True, text=True, timeout=60,
+    )
+    assert run.returncode == 0 and run.stdout.startswith("library, ") and run.stdout.endswith(" 1.0\n"), run
 
 
 def test_metadata_names_version_python_and_licence(metadata):

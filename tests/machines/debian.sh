@@ -1,0 +1,80 @@
+# For the scripts of this folder, which source it: packages of Debian for any processor, unpacked into a folder of this
+# checkout. Nothing of the machine's own is changed, and no rights are needed.
+work=$PWD/build/machines
+mkdir -p "$work"
+
+skip() { echo "skipped: $*"; exit 77; }
+need() { command -v "$1" > /dev/null || skip "no $1: apt-get install $2"; }
+
+apt_of() { # SUITE ARCHITECTURE: a folder of its own for apt-get's lists, in APT_CONFIG
+    local home=$work/apt-$1-$2 keys=/usr/share/keyrings/debian-archive-keyring.gpg
+    need apt-get apt
+    [ -e $keys ] || skip "no keys of Debian's archive: apt-get install debian-archive-keyring"
+    export APT_CONFIG=$home/apt.conf
+    [ -e "$home/updated" ] && return
+    mkdir -p "$home"/{state,lists/partial,cache/archives/partial,parts}
+    touch "$home/status"
+    printf '%s [arch=%s signed-by=%s] http://deb.debian.org/debian %s main\n' deb "$2" $keys "$1" deb-src "$2" $keys "$1" \
+        > "$home/sources.list"
+    cat > "$APT_CONFIG" << CONF
+Dir::State "$home/state";
+Dir::State::Lists "$home/lists";
+Dir::State::status "$home/status";
+Dir::Cache "$home/cache";
+Dir::Etc::SourceList "$home/sources.list";
+Dir::Etc::SourceParts "$home/parts";
+Dir::Etc::PreferencesParts "$home/parts";
+APT::Architecture "$2";
+APT::Architectures { "$2"; };
+APT::Sandbox::User "root";
+Acquire::Languages "none";
+CONF
+    apt-get -q update > "$home/log" 2>&1 || { cat "$home/log"; skip "Debian's archive of $1 cannot be reached"; }
+    touch "$home/updated"
+}
+
+unpacked() { # SUITE ARCHITECTURE FOLDER PACKAGE...: the packages' files
+    local folder=$3
+    [ -e "$folder/unpacked" ] && return
+    (
+        apt_of "$1" "$2"
+        mkdir -p "$folder/packages"
+        cd "$folder/packages"
+        apt-get -q download "${@:4}" > log 2>&1 || { cat log; exit 1; }
+        for package in *.deb; do dpkg -x "$package" "$folder"; done
+        rm -r "$folder/packages"
+    )
+    touch "$folder/unpacked"
+}
+
+wheel_of() { # PLATFORM: its wheel, in $wheel; kernels of unchanged sources are there from the last time
+    python -c 'import ziglang' 2> /dev/null || skip "no cross compiler: pip install 'collide-robotics[machines]'"
+    rm -rf "$work/wheels/$1"
+    COLLIDE_PLATFORM=$1 COLLIDE_REQUIRE_COMPILED=1 nice -n 10 \
+        python -m pip wheel --quiet --no-build-isolation --no-deps --wheel-dir "$work/wheels/$1" .
+    wheel=$(echo "$work/wheels/$1"/*.whl)
+    echo "wheel: $(basename "$wheel")"
+}
+
+examples_of() { # FOLDER TARGET LIBRARY...: programs of examples/c for a target of zig, linked to a library
+    mkdir -p "$1"
+    local source language
+    for source in examples/c/*.c*; do
+        case $source in *.cpp) language=c++ ;; *) language=cc ;; esac
+        nice -n 10 python -m ziglang $language -target "$2" -O2 -Wall -Wextra -Werror -Inative "$source" "${@:3}" \
+            -o "$1/$(basename "${source%.*}").exe"
+    done
+}
+
+examples_agree() { # FOLDER RUN...: what the programs print is what this machine's own print
+    local own=$work/examples library program
+    library=$(python -c 'import collide; print(collide.get_library())')
+    examples_of "$own" x86_64-linux-gnu "$library"
+    for program in two_shapes resting point_cloud threads; do
+        # The level of the processor is another.
+        LD_LIBRARY_PATH=$(dirname "$library") "$own/$program.exe" | sed 's/kernels for .*//' > "$own/$program.txt"
+        "${@:2}" "$1/$program.exe" | sed 's/kernels for .*//;s/\r$//' | diff "$own/$program.txt" - ||
+            { echo "examples/c/$program answers otherwise"; return 1; }
+    done
+    echo "examples/c: 4 programs say what they say on this machine"
+}
