@@ -52,6 +52,7 @@ soaks() {
     run soak-pairs python tests/soak/soak.py --minutes 6 --seed "$seed"
     run soak-contacts python tests/soak/soak_contacts.py --pairs 20000 --seed "$seed"
     run soak-motions python tests/soak/soak_motions.py --motions 5000 --seed "$seed"
+    run soak-solids python tests/soak/soak_solids.py --chains 80 --seed "$seed"
     wait
 }
 faults() { run faults python tests/mutants/planted_faults.py --faults 200 --seed 1; }

@@ -11,6 +11,7 @@ from collide.errors import InvalidArgument, brief
 from collide.shapes.mesh import Mesh
 from collide.shapes.shape import Shape
 from collide.solids.arrangement import Arrangement, arrange, crossings_of
+from collide.solids.clean_mesh import clean_mesh
 from collide.solids.limits import Limits
 from collide.solids.rounded_mesh import rounded_mesh
 from collide.solids.solid_operands import solid_operand
@@ -33,8 +34,8 @@ class BooleanResult(NamedTuple):
         `facet_pairs`.
     before, behind : (k, r) bool, bodies that hold the points just outside each facet, and just inside; a body with a
         surface at the facet differs in the two.
-    moved : the farthest a vertex was moved by rounding to doubles [m].
-    n_collapsed, n_thin : number of triangles, and of shells, left out of the mesh: rounding made them flat.
+    moved : the farthest the surface was moved by rounding to doubles [m].
+    n_collapsed, n_thin : number of triangles, and of shells, left out of the mesh: merged, or made flat by rounding.
     n_meeting, n_cut : number of meeting pairs of facets, and of cut facets.
     """
 
@@ -56,12 +57,15 @@ class BooleanResult(NamedTuple):
 
     @property
     def self_collisions(self) -> np.ndarray:
-        """(k, 2) facets of the mesh that cross each other, by rounding alone: asked when first read, and kept."""
+        """(k, 2) facets of the mesh that cross each other, by rounding alone; asked when first read, and kept.
+
+        Clean rounding leaves no crossing facets, but for results told here.
+        """
         return np.zeros((0, 2), dtype=np.int64) if self.mesh is None else crossings_of(self.mesh)
 
 
 def boolean(
-    A: Shape, B: Shape, X_WA, X_WB, op: str, *, check_poses: bool = True, progress=None,
+    A: Shape, B: Shape, X_WA, X_WB, op: str, *, rounding: str = "clean", check_poses: bool = True, progress=None,
     time_limit: float | None = None, memory: int | None = None,
 ) -> BooleanResult:
     """Union, intersection or difference of two posed solids, as a mesh: decided exactly on the poses as given.
@@ -72,6 +76,8 @@ def boolean(
         `ConvexHull` without a radius, `HPolytope` whose corners are doubles.
     X_WA, X_WB : (4, 4) poses in the world W [m].
     op : "union", "intersection", "difference" (A without B) or "symmetric_difference".
+    rounding : "clean" for a mesh without crossing facets, without flat facets and with as few facets as rounding
+        allows; "exact" for all exact points of the two surfaces, each rounded once, whatever facets cross afterwards.
     check_poses : refuse matrices other than rotations.
     progress : callable, optional. Called with a label, returns a context manager of a function that changes the label.
     time_limit, memory : the most seconds, and bytes, of the call; ``None`` for no limit. A stopped call leaves
@@ -81,11 +87,13 @@ def boolean(
     -------
     BooleanResult, with the solid as a `Mesh` in W. The solid is the interior of the operation's result, with its
     border: touching sets intersect in the empty set, and no wall is left between flush bodies. Every edge is shared
-    exactly; vertices are exact points of the two surfaces, rounded once to the nearest doubles.
+    exactly; vertices are exact points of the two surfaces, rounded once to the nearest doubles. Clean rounding merges
+    what is nearer than four units in the last place of the largest coordinate, farther only where facets would still
+    cross; ``moved`` is how far. Of merged facets ``facet`` has one.
 
     Raises
     ------
-    InvalidArgument : a surface without an inside, with its defects and facet numbers; an unknown operation.
+    InvalidArgument : a surface without an inside, with its defects and facet numbers; an unknown operation or rounding.
     InvalidPose : matrices other than poses.
     UnsupportedQuery : curved shapes, unions and half-spaces, by name; a limit reached, with an estimate of the need.
 
@@ -99,18 +107,28 @@ def boolean(
     if rule is None:
         names = ", ".join(repr(name) for name in OPERATIONS)
         raise InvalidArgument(f"boolean: op must be one of {names}, got {brief(op)}")
+    check_rounding("boolean", rounding)
     operands = [
         solid_operand("boolean", name, shape, X, check_poses) for name, shape, X in (("A", A, X_WA), ("B", B, X_WB))
     ]
     with Limits("boolean", progress, time_limit, memory) as limits:
         arrangement = arrange(operands, limits)
-        return solid_of(arrangement, rule(arrangement.holds()))
+        return solid_of(arrangement, rule(arrangement.holds()), rounding)
 
 
-def solid_of(arrangement: Arrangement, keep: np.ndarray) -> BooleanResult:
-    """The cells of an arrangement to keep, (c,) bool, as one solid: rounded once."""
+def check_rounding(caller: str, rounding) -> None:
+    """Refuse what is no kind of rounding."""
+    if not isinstance(rounding, str) or rounding not in ("clean", "exact"):
+        raise InvalidArgument(f"{caller}: rounding must be 'clean' or 'exact', got {brief(rounding)}")
+
+
+def solid_of(arrangement: Arrangement, keep: np.ndarray, rounding: str) -> BooleanResult:
+    """The cells of an arrangement to keep, (c,) bool, as one solid in doubles."""
     triangles, sheets = arrangement.boundary(keep)
-    made = rounded_mesh(arrangement.points, triangles)
+    if rounding == "exact":
+        made = rounded_mesh(arrangement.points, triangles)
+    else:
+        made = clean_mesh(arrangement, triangles, sheets, _classes(arrangement, sheets))
     rows = sheets[made.rows]
     source = arrangement.sheets.facet[rows]
     sides = arrangement.cells.sides[rows]
@@ -121,3 +139,11 @@ def solid_of(arrangement: Arrangement, keep: np.ndarray) -> BooleanResult:
         made.mesh, arrangement.facets.body[source], arrangement.facets.number[source], before, behind, made.moved,
         made.n_collapsed, made.n_thin, arrangement.n_meeting, arrangement.n_cut,
     )
+
+
+def _classes(arrangement: Arrangement, rows: np.ndarray) -> np.ndarray:
+    """(k,) int64: equal for sheets of a body with the same bodies on both sides."""
+    _, held = np.unique(arrangement.holds(), axis=0, return_inverse=True)
+    sides = np.sort(held.ravel()[arrangement.cells.sides[rows]], axis=1)
+    n = len(held)
+    return (arrangement.facets.body[arrangement.sheets.facet[rows]] * n + sides[:, 0]) * n + sides[:, 1]

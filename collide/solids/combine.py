@@ -12,7 +12,7 @@ from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument, brief
 from collide.shapes.shape import Shape
 from collide.solids.arrangement import arrange
-from collide.solids.boolean import BooleanResult, solid_of
+from collide.solids.boolean import BooleanResult, check_rounding, solid_of
 from collide.solids.limits import Limits
 from collide.solids.placed_facets import Operand
 from collide.solids.solid_operands import solid_operand
@@ -28,8 +28,8 @@ RULES: dict[str, MembershipRule] = {
 
 
 def combine(
-    shapes: Sequence[Shape], poses, rule: str | MembershipRule, *, check_poses: bool = True, progress=None,
-    time_limit: float | None = None, memory: int | None = None,
+    shapes: Sequence[Shape], poses, rule: str | MembershipRule, *, rounding: str = "clean", check_poses: bool = True,
+    progress=None, time_limit: float | None = None, memory: int | None = None,
 ) -> BooleanResult:
     """A solid from r posed solids, by any rule on the set of solids holding a point; decided exactly.
 
@@ -43,6 +43,7 @@ def combine(
     rule : "union", "intersection", "parity" (in an odd number of bodies), "at least k" with a number k; or a function
         of a tuple of r bools, asked once for every occurring combination of bodies: whether points held by exactly
         these belong to the result. Points outside all bodies must not belong.
+    rounding : "clean" or "exact", as of `boolean`.
     check_poses : refuse matrices other than rotations.
     progress, time_limit, memory : as of `boolean`.
 
@@ -63,6 +64,7 @@ def combine(
     J. Erickson, "Local polyhedra and geometric graphs" (2005), theorem 6.1: the arrangement of r local polyhedra with n
     facets each has O(r³ n log² n) vertices, a bound of the number of cuts. docs/solids.md has the figures.
     """
+    check_rounding("combine", rounding)
     operands = _operands(shapes, poses, check_poses)
     asked = _rule(rule, len(operands))
     order = _canonical_order(operands)
@@ -74,7 +76,7 @@ def combine(
         holds = np.empty_like(arrangement.holds())
         holds[:, order] = arrangement.holds()
         patterns, which = np.unique(holds, axis=0, return_inverse=True)
-        r = solid_of(arrangement, _asked("combine", asked, patterns)[which.ravel()])
+        r = solid_of(arrangement, _asked("combine", asked, patterns)[which.ravel()], rounding)
     back = np.argsort(order)
     return r._replace(body=order[r.body], before=r.before[:, back], behind=r.behind[:, back])
 

@@ -82,7 +82,7 @@ def _best_ear(seen, m, limit):
 
 
 @kernel
-def _clip(ids, m, seen, error, triangles, count):
+def clip_polygon(ids, m, seen, error, triangles, count):
     """Append the triangles of a polygon; returns the number of triangles after, −1 where an ear is not proven."""
     size = 0.0
     for k in range(m):
@@ -181,7 +181,7 @@ def clip_parts(
         if not component(normal, axis) > 0.0:
             u, v = v, u
         largest = _look_at((a, b, c, p, q, r), ids, m, place, n_vertices, u, v, seen)
-        made = _clip(ids, m, seen, bound + off + _U * largest, triangles, count)
+        made = clip_polygon(ids, m, seen, bound + off + _U * largest, triangles, count)
         if made < 0:
             failed[f] = 1
             continue

@@ -32,24 +32,28 @@ def rounded_mesh(points: CutPoints, triangles: np.ndarray) -> RoundedMesh:
     """The solid of triangles (k, 3) that close, vertices rounded to the nearest doubles of W."""
     ids, faces = used_points(triangles, len(points))
     vertices, moved = rounded_points(points, ids)
-    corners, proper = _welded(vertices, faces)
-    rows, n_thin = proper, 0
+    corners, proper = welded(vertices, faces)
+    mesh, remaining, n_thin = solid_of_facets(vertices, corners[proper] if len(proper) < len(faces) else corners)
+    return RoundedMesh(mesh, proper[remaining], moved, len(faces) - len(proper), n_thin)
+
+
+def solid_of_facets(vertices: np.ndarray, faces: np.ndarray) -> tuple[Mesh | None, np.ndarray, int]:
+    """(the solid of faces that close, ``None`` where nothing remains, their rows (k,), number of flat shells left out).
+    """
+    rows, n_thin = np.arange(len(faces)), 0
     while len(rows):
-        if len(rows) < len(faces) or corners is not faces:
-            used, compact = used_points(corners[rows], len(vertices))
-            mesh = Mesh(vertices[used], compact)
-        else:
-            mesh = Mesh(vertices, faces)
+        used, compact = used_points(faces[rows], len(vertices))
+        mesh = Mesh(vertices, faces) if len(used) == len(vertices) else Mesh(vertices[used], compact)
         if mesh.solid:
-            return RoundedMesh(mesh, rows, moved, len(faces) - len(proper), n_thin)
+            return mesh, rows, n_thin
         survey = mesh.survey
         spoilt = survey.flags & (EMPTY | INSIDE_OUT) != 0
         n_thin += len(np.unique(survey.shells[spoilt]))
         rows = rows[~spoilt] if spoilt.any() else rows[:0]
-    return RoundedMesh(None, rows, moved, len(faces) - len(proper), n_thin)
+    return None, rows, n_thin
 
 
-def _welded(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def welded(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(the faces with equal vertices named by the first, and those with three distinct corners)."""
     same = weld(vertices) if len(vertices) else np.zeros(0, dtype=np.int32)
     if (same == np.arange(len(same))).all():

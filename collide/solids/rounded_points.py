@@ -16,7 +16,7 @@ def rounded_points(points: CutPoints, ids: np.ndarray) -> tuple[np.ndarray, floa
     places, off, proven = np.empty((len(ids), 3)), np.zeros(len(ids)), np.zeros(len(ids), dtype=bool)
     is_vertex = ids < points.n_vertices
     rows = np.flatnonzero(is_vertex)
-    places[rows], off[rows], proven[rows] = _rounded_vertices(facets, ids[rows])
+    places[rows], off[rows], proven[rows] = rounded_vertices(facets, ids[rows])
     rows = np.flatnonzero(~is_vertex & (ids < points.n_vertices + len(points.pierced)))
     places[rows], off[rows], proven[rows] = _rounded_piercings(facets, points.pierced[ids[rows] - points.n_vertices])
     remaining = np.flatnonzero(~proven)
@@ -27,7 +27,7 @@ def rounded_points(points: CutPoints, ids: np.ndarray) -> tuple[np.ndarray, floa
     return places + 0.0, float(off.max(initial=0.0))
 
 
-def _rounded_vertices(facets: PlacedFacets, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def rounded_vertices(facets: PlacedFacets, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """((k, 3) vertices in W rounded to doubles, (k,) how far that is off at most, (k,) bool: proven nearest)."""
     rows = np.ascontiguousarray(rows, dtype=np.int64)
     answers = _answers(len(rows))

@@ -1,0 +1,87 @@
+"""The solid of an arrangement's triangles in doubles, without crossing facets and without flat facets.
+
+Points are rounded and facets merged (`facet_merging.py`); then all facets are asked exactly whether they cross. While
+some do, near features are joined as well (`near_features.py`), with twice the reach in every further round. After
+`_ROUNDS` rounds the work ends, and the remaining crossings are told.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.kernels import address_of
+from collide.solids.arrangement import Arrangement, crossings_of
+from collide.solids.closed_surface import N_VERTICES, SurfaceArrays
+from collide.solids.facet_merging import merge_flat_facets
+from collide.solids.placed_facets import PlacedFacets
+from collide.solids.rounded_mesh import RoundedMesh, solid_of_facets, used_points, welded
+from collide.solids.rounded_points import rounded_points, rounded_vertices
+
+#: The reach of the first round, in units in the last place of the largest coordinate.
+REACH = 4.0
+_ROUNDS = 8
+
+
+class _Sources(NamedTuple):
+    """Of every triangle its plane and its class; the planes (p, 6), a point and a unit normal each."""
+
+    plane: np.ndarray
+    kind: np.ndarray
+    planes: np.ndarray
+
+
+def clean_mesh(arrangement: Arrangement, triangles: np.ndarray, rows: np.ndarray, kind: np.ndarray) -> RoundedMesh:
+    """The solid of triangles (k, 3) of an arrangement that close.
+
+    rows : (k,) their sheets.   kind : (k,) int64, a class; facets of different classes are not merged.
+    """
+    sources = _sources_of(arrangement, triangles, rows, kind)
+    ids, faces = used_points(triangles, len(arrangement.points))
+    vertices, off = rounded_points(arrangement.points, ids)
+    faces, proper = welded(vertices, faces)
+    unit = np.spacing(np.abs(vertices).max(initial=0.0))
+    movable = np.zeros(len(ids), dtype=bool)
+    movable[faces[rows >= len(arrangement.facets.corners) - arrangement.n_cut]] = True
+    for attempt in range(_ROUNDS):
+        reach = REACH * 2.0 ** max(attempt - 1, 0) * unit
+        made = _merged(vertices, faces[proper], proper, sources, movable, reach, attempt > 0)
+        mesh, remaining, n_thin = solid_of_facets(made.vertices, made.corners)
+        if mesh is None or not len(crossings_of(mesh)):
+            break
+        movable[:] = True
+    return RoundedMesh(mesh, made.sources[remaining], off + made.moved, len(triangles) - len(remaining), n_thin)
+
+
+def _sources_of(arrangement: Arrangement, triangles: np.ndarray, rows: np.ndarray, kind: np.ndarray) -> _Sources:
+    facets: PlacedFacets = arrangement.facets
+    turned = triangles[:, 0] != arrangement.sheets.triangles[rows, 0]
+    some, plane = np.unique(2 * arrangement.sheets.facet[rows] + turned, return_inverse=True)
+    corners, _, _ = rounded_vertices(facets, facets.corners[some // 2].ravel())
+    corners = corners.reshape(-1, 3, 3)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    size = np.sqrt((normals * normals).sum(axis=1)) * np.where(some % 2, -1.0, 1.0)
+    normals /= np.where(size != 0.0, size, 1.0)[:, None]
+    return _Sources(plane.ravel(), np.ascontiguousarray(kind), np.concatenate([corners[:, 0], normals], axis=1))
+
+
+class _Merged(NamedTuple):
+    """A surface with facets merged.   sources : of each of ``corners``.   moved : how far, at most [m]."""
+
+    vertices: np.ndarray
+    corners: np.ndarray
+    sources: np.ndarray
+    moved: float
+
+
+def _merged(vertices, corners, origin, sources: _Sources, movable, reach: float, joins: bool) -> _Merged:
+    arrays = SurfaceArrays(
+        vertices, corners, origin, sources.plane[origin], sources.kind, sources.planes, movable, joins
+    )
+    count = merge_flat_facets(address_of(arrays.header), reach, joins)
+    n = arrays.counts[N_VERTICES]
+    return _Merged(
+        arrays.points[: 3 * n].reshape(-1, 3), arrays.corners[: 3 * count].reshape(-1, 3), arrays.sources[:count],
+        float(arrays.far[0]),
+    )
