@@ -93,14 +93,14 @@ def _clear_crossings(facets: PlacedFacets, points: CutPoints, pairs: np.ndarray)
     facets to be cut exactly).
 
     Two ends are a single point if the same edge pierces the same facet: a rule for facets of two bodies. Facets
-    crossing their own body's, their neighbours in such crossings, and all facets of three bodies and more, are cut
-    exactly.
+    crossing their own body's, their neighbours in such crossings, and facets meeting two other bodies, are cut exactly.
+    A point on facets of three bodies is on facets that meet, so each of them meets two other bodies.
     """
     of_one = facets.body[pairs[:, 0]] == facets.body[pairs[:, 1]]
     crossings, proven = crossing_pairs(facets, pairs[~of_one])
     exactly = np.zeros(len(facets.corners), dtype=bool)
     if len(facets.operands) > 2:
-        exactly[pairs] = True
+        exactly[_of_three_bodies(facets, pairs)] = True
     exactly[pairs[of_one]] = True
     exactly[pairs[exactly[pairs].any(axis=1)]] = True
     exactly[pairs[~of_one][~proven]] = True
@@ -123,6 +123,16 @@ def _clear_crossings(facets: PlacedFacets, points: CutPoints, pairs: np.ndarray)
     is_clear = ~of_one
     is_clear[is_clear] = proven
     return crossings, start + ends.reshape(-1, 2), is_clear, exactly
+
+
+def _of_three_bodies(facets: PlacedFacets, pairs: np.ndarray) -> np.ndarray:
+    """(k,) rows of facets that meet facets of two other bodies or more."""
+    rows, met = pairs.ravel(), facets.body[pairs[:, ::-1].ravel()]
+    least = np.full(len(facets.corners), len(facets.operands))
+    most = np.full(len(facets.corners), -1)
+    np.minimum.at(least, rows, met)
+    np.maximum.at(most, rows, met)
+    return np.flatnonzero(least < most)
 
 
 def _all_sheets(
