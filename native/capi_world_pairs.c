@@ -36,12 +36,9 @@ static int begin_question(const collide_world *world, collide_workspace *space)
 {
     struct world_space *own = space->world;
     space->message[0] = 0;
-    if (own == NULL) {
-        size_t doubles = (size_t)(world->measures[W_RAY_DOUBLES] + world->measures[W_RAY_INTEGERS]);
-        if ((own = space->world = calloc(1, sizeof *own)) == NULL) return 0;
-        own->stack = malloc(16 * (size_t)world->measures[W_STACK_OF_PAIRS]);
-        own->rays = calloc(doubles, 8);
-    }
+    if (own == NULL && (own = space->world = calloc(1, sizeof *own)) == NULL) return 0;
+    if (own->stack == NULL) own->stack = malloc(16 * (size_t)world->measures[W_STACK_OF_PAIRS]);
+    if (own->rays == NULL) own->rays = calloc((size_t)(world->measures[W_RAY_DOUBLES] + world->measures[W_RAY_INTEGERS]), 8);
     if (own->stack == NULL || own->rays == NULL || !fit_keys(own, 64 + 4 * world->n)) return 0;
     if (world->n < own->n_counts) return 1;
     if (more_of(&own->counts, 2 * world->n + 2) == NULL || more_of(&own->skipped, 2 * world->n + 2) == NULL) return 0;

@@ -166,6 +166,16 @@ def test_the_page_says_what_runs(tmp_path):
     assert run(built(tmp_path, text)).split() == ["1.25", "0"]
 
 
+def test_memory_that_runs_out_changes_no_world(tmp_path):
+    """Each allocation of changes and of questions fails once: that is told, and the call can be made again."""
+    if not sys.platform.startswith("linux"):
+        pytest.skip("the program stands before the allocations of glibc")
+    text = Path(__file__).with_name("failing_memory.c").read_text(encoding="utf-8")
+    told = run(built(tmp_path, text))
+    n = int(told.split()[0])
+    assert n >= 60 and told == f"{n} allocations, 0 different, 0 untold\n", told
+
+
 def test_rounding_of_the_caller_changes_nothing(tmp_path):
     """Rounding upwards, and small numbers flushed to 0 where the processor can."""
     told = run(built(tmp_path, _ROUNDING)).splitlines()
