@@ -15,7 +15,8 @@ struct cast_space *cast_space_of(collide_workspace *space)
     if (space->cast != NULL) return space->cast;
     if (space->kernels->write_cast_constants(address_of(m), CAST_MEASURES) != CAST_MEASURES || m[K_QUESTION] != CAST_QUESTION ||
         m[K_CAST_ROW] != CAST_ROW || m[K_MARKS] != CAST_MARKS || m[K_PACE_TERMS] != PACE_TERMS || m[K_RAY] != CHORD_RAY ||
-        m[K_CHORD_ROW] != CHORD_ROW || m[K_FACET_RAY] != FACET_RAY || m[K_FACET_HIT] != FACET_HIT)
+        m[K_CHORD_ROW] != CHORD_ROW || m[K_FACET_RAY] != FACET_RAY || m[K_FACET_HIT] != FACET_HIT ||
+        m[K_UNION_HEADER] != UNION_HEADER || m[K_UNION_WORK] != UNION_WORK || m[K_UNION_ROW] != UNION_ROW)
         return NULL;
     made = cache_lines(sizeof *made + 8 * (size_t)(m[K_DOUBLES] + m[K_INTEGERS]), &held);
     if (made == NULL) return NULL;
@@ -81,7 +82,7 @@ static collide_status decide(const struct cast_question *asked)
 /* t in units of the direction handed in: it was scaled by a power of two. */
 static double unscaled(const struct cast_space *cast, double t) { return ldexp(t, (int)-cast->exponent); }
 
-static void begin_contact(collide_first_contact *first)
+void begin_contact(collide_first_contact *first)
 {
     memset(first, 0, sizeof *first);
     first->distance = first->lower = first->upper = INFINITE;

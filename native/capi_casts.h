@@ -19,15 +19,21 @@ enum {
     LAST_NORMAL = FIRST_NORMAL + 3, CHORD_ROW = LAST_NORMAL + 3
 };
 /* What `write_cast_constants` writes (collide/casts/cast_constants.py). */
-enum { K_QUESTION, K_CAST_ROW, K_MARKS, K_PACE_TERMS, K_RAY, K_CHORD_ROW, K_DOUBLES, K_INTEGERS, K_FACET_RAY, K_FACET_HIT, CAST_MEASURES };
+enum { K_QUESTION, K_CAST_ROW, K_MARKS, K_PACE_TERMS, K_RAY, K_CHORD_ROW, K_DOUBLES, K_INTEGERS, K_FACET_RAY, K_FACET_HIT, K_UNION_HEADER, K_UNION_WORK, K_UNION_ROW, CAST_MEASURES };
 /* A ray to facets, and a hit (collide/narrowphase/facets/ray_surface.py). */
 enum { FACET_RAY = 8 };
 enum { HIT_RAY, HIT_FACET, HIT_LOWER, HIT_VALUE, HIT_UPPER, HIT_OPEN, HIT_PLACE, FACET_HIT };
+
+/* Header of casts of unions before that of unions, words to work in, and an answer (collide/casts/union_cast.py). */
+enum { UNION_CASTS = 4, UNION_HEADER = UNION_CASTS + 29, UNION_WORK = 165 };
+enum { UNION_T, UNION_NORMAL = 3, UNION_POINT = 6, UNION_PART_A = 9, UNION_PART_B, UNION_AT_START, UNION_ROW };
 
 struct cast_space {
     double question[CAST_QUESTION], row[CAST_ROW], terms[PACE_TERMS];
     double ray[CHORD_RAY], chord[CHORD_ROW];
     int64_t exponent, listed, ray_and_part[2];
+    int64_t union_header[UNION_HEADER];
+    double union_work[UNION_WORK], union_row[UNION_ROW];
     uint8_t marks[CAST_MARKS];
     double *doubles;
     int64_t *integers;
@@ -35,6 +41,9 @@ struct cast_space {
 
 /* The workspace's room for casts, made at the first of them; NULL where there is no memory, or the library's parts do not fit. */
 struct cast_space *cast_space_of(collide_workspace *space);
+
+/* What meets nothing, proven. */
+void begin_contact(collide_first_contact *first);
 
 /* A direction scaled by a power of two, into `vector` and the room's `exponent`; 0 where it is none. */
 int take_direction(collide_workspace *space, const double direction[3], double vector[3]);

@@ -369,6 +369,13 @@ COLLIDE_API collide_status collide_compound_distance(collide_workspace *workspac
                                                      const collide_compound *B, collide_poses X_WA, collide_poses X_WB,
                                                      double max_distance, unsigned flags, collide_pair *pairs, size_t *failed);
 
+/* The first contact of A, moved along a direction, and B, which stands, as collide_cast; part_a and part_b name the parts that touch.
+   flags : COLLIDE_TRUST_POSES or 0. COLLIDE_UNSUPPORTED: a half-space in A, which Python refuses as well, parts that graze or touch
+   each other within rounding, and more than 1024 pairs of parts, or 256 of larger unions, that are in each other's way. */
+COLLIDE_API collide_status collide_compound_cast(collide_workspace *workspace, const collide_compound *A, const collide_compound *B,
+                                                 const double X_WA[16], const double X_WB[16], const double direction[3],
+                                                 double max_distance, unsigned flags, collide_first_contact *first);
+
 /* Contacts of A and B, as those of their parts: at most max_contacts of each pair of parts, in the order of part_a and part_b; patch
    counts the pairs. contacts : room for `capacity` rows. *count : how many there are. COLLIDE_TOO_MANY: more than that, of which as many
    are written. COLLIDE_UNSUPPORTED, never a guess: parts that touch, or are apart by a margin, within rounding, half-spaces at poses of

@@ -8,6 +8,7 @@ from collide.casts.cast_pairs import CAST_ROW, QUESTION
 from collide.casts.close_casts import MARKS, PACE_TERMS
 from collide.casts.cut_parts import RAY, RAY_DOUBLES, RAY_ROW
 from collide.casts.silhouette import CAST_DOUBLES, CAST_INTEGERS
+from collide.casts.union_cast import UNION_HEADER, UNION_ROW, UNION_WORK
 from collide.kernels import entry, view_i64
 from collide.narrowphase.facets import ray_surface
 
@@ -15,7 +16,7 @@ from collide.narrowphase.facets import ray_surface
 _CONSTANTS = np.array(
     [
         QUESTION, CAST_ROW, MARKS, PACE_TERMS, RAY, RAY_ROW, max(CAST_DOUBLES, RAY_DOUBLES), CAST_INTEGERS,
-        ray_surface.RAY, ray_surface.HIT,
+        ray_surface.RAY, ray_surface.HIT, UNION_HEADER, UNION_WORK, UNION_ROW,
     ],
     dtype=np.int64,
 )

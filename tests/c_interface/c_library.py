@@ -110,6 +110,9 @@ _TYPES = {
     "collide_cast": [
         c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_uint, c_void_p,
     ],
+    "collide_compound_cast": [
+        c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_uint, c_void_p,
+    ],
     "collide_cast_batch": [
         c_void_p, c_void_p, c_void_p, Poses, Poses, Vectors, c_double, c_uint, c_void_p, c_void_p, POINTER(c_size_t),
     ],
@@ -444,10 +447,11 @@ class Asker:
         )
         return status, out, failed.value
 
-    def cast(self, A: CShape, B: CShape, X_WA, X_WB, direction, limit: float = math.inf, flags: int = 0):
-        """(status, row)."""
+    def cast(self, A, B, X_WA, X_WB, direction, limit: float = math.inf, flags: int = 0):
+        """(status, row) of two `CShape` or `CCompound`."""
         rows, X_WA, X_WB, direction = np.full(1, 7, dtype=FIRST_CONTACT), *map(_doubles, (X_WA, X_WB, direction))
-        status = library().collide_cast(
+        name = "collide_cast" if isinstance(A, CShape) else "collide_compound_cast"
+        status = getattr(library(), name)(
             self.handle, A.handle, B.handle, X_WA.ctypes.data, X_WB.ctypes.data, direction.ctypes.data, limit, flags,
             rows.ctypes.data,
         )

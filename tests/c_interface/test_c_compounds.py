@@ -183,3 +183,28 @@ def test_contacts_of_a_union_at_rest_and_room_for_them():
     assert asker.many_contacts(*pair, X, np.eye(4), 0.0, 0)[0] == c.INVALID_ARGUMENT
     for number, bad in enumerate(c.odd_poses()):
         assert asker.many_contacts(*pair, X, bad, 0.0, 4)[0] == c.INVALID_POSE, number
+
+
+def test_casts_have_pythons_bits_or_are_left_to_python():
+    asker, told = c.Asker(), {"hit": 0, "at start": 0, "miss": 0, "left": 0}
+    for number, ((name, A, B, X_WA, X_WB), pair) in enumerate(zip(drawn(), made())):
+        random = np.random.default_rng([114, number])
+        ahead = X_WB[:3, 3] - X_WA[:3, 3]
+        size, X = float(np.linalg.norm(ahead)), X_WA.copy()
+        X[:3, 3] -= ahead * random.uniform(0, 4) * (number % 3)
+        d = (ahead / size + 0.1 * random.normal(size=3)) * 10.0 ** random.uniform(-2, 2)
+        limit = math.inf if number % 8 else size / float(np.linalg.norm(d))
+        if isinstance(A, collide.Halfspace):
+            assert asker.cast(*pair, X, X_WB, d, limit)[0] == c.UNSUPPORTED
+            continue
+        wanted = np.zeros((), dtype=c.FIRST_CONTACT)
+        for field, value in collide.shape_cast(A, X, d, B, X_WB, max_distance=limit)._asdict().items():
+            wanted[field] = value
+        status, row = asker.cast(*pair, X, X_WB, d, limit)
+        if status == c.OK:
+            assert row.tobytes() == wanted.tobytes(), (name, limit, row, wanted)
+            told["at start" if row["at_start"] else "hit" if row["hit"] else "miss"] += 1
+        else:
+            assert status == c.UNSUPPORTED and not row["hit"], (name, status)
+            told["left"] += 1
+    assert told["hit"] >= 45 and told["at start"] >= 20 and told["miss"] >= 20 and told["left"] <= 30, told

@@ -146,6 +146,9 @@ def test_examples_are_built_by_make_and_run(tmp_path):
     told = run(tmp_path / "c" / "resting", env=bare)
     assert "4 contacts, the normal is (0, 0, 1)" in told and told.count("gap 1.0000 mm") == 4
     assert "the first within the margin is 30, with a gap of 2.00 mm; 280 rows" in told
+    told = run(tmp_path / "c" / "reaching", env=bare)
+    assert "goes down 0.360 m, then part 1 touches" in told and "meets the table after 0.480 m" in told
+    assert "arrives at 0.48 of its way" in told and "8 contacts, of parts 1 to 2, 0.5 mm apart" in told
     told = run(tmp_path / "c" / "point_cloud", env=bare)
     assert "cloud: met from z = 0.50 m on; from 1 m it is 0.4900 m away, item 5050" in told
     assert "voxels: met from z = 0.50 m on" in told and "101 points are within 0.2 m of it" in told
