@@ -30,8 +30,8 @@ enum { UNION_T, UNION_NORMAL = 3, UNION_POINT = 6, UNION_PART_A = 9, UNION_PART_
 
 struct cast_space {
     double question[CAST_QUESTION], row[CAST_ROW], terms[PACE_TERMS];
-    double ray[CHORD_RAY], chord[CHORD_ROW];
-    int64_t exponent, listed, ray_and_part[2];
+    double ray[CHORD_RAY];
+    int64_t exponent, listed;
     int64_t union_header[UNION_HEADER];
     double union_work[UNION_WORK], union_row[UNION_ROW];
     uint8_t marks[CAST_MARKS];

@@ -1,23 +1,35 @@
-/* Where rays first meet a convex shape or a mesh: `raycast` of collide/casts/raycast.py, by the kernels of ray_parts.py, ray_facets.py
+/* Where rays first meet a convex shape, a union or a mesh: `raycast` of collide/casts/raycast.py, by the kernels of ray_parts.py, ray_facets.py
    and ray_hits.py. What Python decides in integers is told by its proven bracket, or said to be unsupported. */
 #include "capi_casts.h"
+#include "capi_compound.h"
 #include "capi_box_tree.h"
 #include "capi_mesh.h"
 
 typedef char ray_hits_are_rows[sizeof(collide_ray_hit) == 88 ? 1 : -1];
 
 /* Places of a surface that a ray meets, as collide/casts/ray_ends.py has them: a chord has two. */
-enum { MAX_PLACES = 2 };
 struct places {
-    double t[3 * MAX_PLACES], normals[3 * MAX_PLACES];
-    int64_t columns[3 * MAX_PLACES], n; /* ray, facet, item */
-    uint8_t flags[2 * MAX_PLACES];      /* proven, certified */
+    double *t, *normals;      /* three each */
+    int64_t *columns, *first; /* three each: ray, facet, item; the number of the first */
+    uint8_t *flags;           /* two each: proven, certified */
+    int64_t n;
 };
 
-/* A ray and what it is cast at: a mesh, or where that is NULL a shape that stands in the workspace's table. */
+/* Chords of all parts of a union, or of a single shape: where parts stand and what is asked about them. */
+struct chords {
+    int64_t n, ints_at, numbers_at;
+    double *poses, *rows, *limits;       /* of every part, and the union's own pose behind them */
+    int64_t *shape_of, *asked, *listed;
+    uint8_t *exact;
+    struct places places;
+};
+
+/* A ray and what it is cast at: a mesh, or where that is NULL convex parts: of a union, or where that is NULL a shape. */
 struct ray {
     collide_workspace *space;
     const collide_mesh *mesh;
+    const collide_compound *compound;
+    struct chords *chords;
     const double *X, *origin, *direction;
     double limit; /* in units of the scaled direction, once it is */
     unsigned flags;
@@ -34,23 +46,50 @@ static void begin_hit(collide_ray_hit *hit)
     hit->certified = 1;
 }
 
-/* The two ends of the ray's chord in a convex set, or those of them that count. */
-static collide_status chord_of(const struct ray *ray, struct places *places)
+/* Room for the chords of n parts. */
+static int begin_chords(struct chords *chords, struct arena *arena, int64_t n)
 {
-    collide_workspace *space = ray->space;
-    const struct collide_kernels *kernels = space->kernels;
-    struct cast_space *cast = space->cast;
-    const int64_t *h = space->header;
-    int64_t asked[2] = {0, 0}, listed;
-    int64_t asked_at = address_of(asked), row_at = address_of(cast->chord), limit_at = address_of(&ray->limit);
-    uint8_t exact = 0;
+    size_t k, m = (size_t)n;
+    chords->n = n;
+    chords->poses = arena_take(arena, (m + 1) * POSE * sizeof(double));
+    chords->rows = arena_take(arena, m * CHORD_ROW * sizeof(double));
+    chords->limits = arena_take(arena, m * sizeof(double));
+    chords->shape_of = arena_take(arena, m * sizeof(int64_t));
+    chords->asked = arena_take(arena, 2 * m * sizeof(int64_t));
+    chords->listed = arena_take(arena, m * sizeof(int64_t));
+    chords->exact = arena_take(arena, m);
+    chords->places.t = arena_take(arena, 6 * m * sizeof(double));
+    chords->places.normals = arena_take(arena, 6 * m * sizeof(double));
+    chords->places.columns = arena_take(arena, 6 * m * sizeof(int64_t));
+    chords->places.first = arena_take(arena, 2 * m * sizeof(int64_t));
+    chords->places.flags = arena_take(arena, 4 * m);
+    if (arena->failed) return 0;
+    for (k = 0; k < m; k++) {
+        chords->shape_of[k] = chords->asked[2 * k + 1] = (int64_t)k;
+        chords->asked[2 * k] = 0;
+    }
+    memset(chords->exact, 0, m);
+    return 1;
+}
+
+/* The ends of the ray's chords in all parts, those of them that count. */
+static collide_status ends_of_chords(const struct ray *ray)
+{
+    struct chords *chords = ray->chords;
+    struct places *places = &chords->places;
+    const struct collide_kernels *kernels = ray->space->kernels;
+    struct cast_space *cast = ray->space->cast;
+    int64_t asked_at = address_of(chords->asked), rows_at = address_of(chords->rows), limits_at = address_of(chords->limits), k;
+    if (ray->compound != NULL) kernels->place_all_parts(address_of(ray->compound->parts), chords->n, address_of(chords->poses));
     memcpy(cast->ray, ray->origin, 3 * sizeof *cast->ray);
-    memset(cast->chord, 0, sizeof cast->chord);
-    kernels->cut_parts(h[INTS_AT], h[NUMBERS_AT], h[POSES_AT], h[SHAPE_OF_AT], asked_at, address_of(cast->ray), 1, 0, row_at,
-                       address_of(cast->doubles), address_of(cast->integers));
-    if (kernels->list_open_chords(h[INTS_AT], h[NUMBERS_AT], h[SHAPE_OF_AT], asked_at, row_at, limit_at, 1, 0, address_of(&listed)) > 0)
+    memset(chords->rows, 0, (size_t)(chords->n * CHORD_ROW) * sizeof(double));
+    for (k = 0; k < chords->n; k++) chords->limits[k] = ray->limit;
+    kernels->cut_parts(chords->ints_at, chords->numbers_at, address_of(chords->poses), address_of(chords->shape_of), asked_at,
+                       address_of(cast->ray), chords->n, 0, rows_at, address_of(cast->doubles), address_of(cast->integers));
+    if (kernels->list_open_chords(chords->ints_at, chords->numbers_at, address_of(chords->shape_of), asked_at, rows_at, limits_at,
+                                  chords->n, 0, address_of(chords->listed)) > 0)
         return COLLIDE_UNSUPPORTED;
-    places->n = kernels->write_chord_ends(row_at, asked_at, limit_at, address_of(&cast->exponent), address_of(&exact), 1,
+    places->n = kernels->write_chord_ends(rows_at, asked_at, limits_at, address_of(&cast->exponent), address_of(chords->exact), chords->n,
                                           address_of(places->t), address_of(places->normals), address_of(places->columns),
                                           address_of(places->flags));
     return COLLIDE_OK;
@@ -112,38 +151,42 @@ static void write_hit(const struct ray *ray, struct places *places, collide_ray_
 {
     const struct collide_kernels *kernels = ray->space->kernels;
     struct cast_space *cast = ray->space->cast;
-    int64_t first[MAX_PLACES], ray_number = 0;
+    int64_t ray_number = 0, first;
     const double *t;
     begin_hit(hit);
     if (places->n == 0) return;
-    kernels->first_places(address_of(places->t), address_of(places->columns), address_of(places->flags), places->n, address_of(first));
-    t = places->t + 3 * first[0];
+    kernels->first_places(address_of(places->t), address_of(places->columns), address_of(places->flags), places->n, address_of(places->first));
+    first = places->first[0];
+    t = places->t + 3 * first;
     kernels->write_places(address_of(ray->origin), address_of(cast->ray + RAY_VECTOR), address_of(&cast->exponent),
                           address_of(&ray_number), address_of(t), 1, address_of(hit->point));
     hit->distance = t[0];
     hit->lower = t[1];
     hit->upper = t[2];
-    memcpy(hit->normal, places->normals + 3 * first[0], sizeof hit->normal);
-    hit->facet = (int32_t)places->columns[3 * first[0] + 1];
-    hit->part = 0;
+    memcpy(hit->normal, places->normals + 3 * first, sizeof hit->normal);
+    hit->facet = (int32_t)places->columns[3 * first + 1];
+    hit->part = (int32_t)places->columns[3 * first + 2];
     hit->hit = 1;
-    hit->certified = places->flags[2 * first[0] + 1];
+    hit->certified = places->flags[2 * first + 1];
 }
 
 static collide_status cast_ray(struct ray *ray, double max_distance, collide_ray_hit *hit)
 {
     struct cast_space *cast = ray->space->cast;
-    struct places places;
+    struct places *places = &ray->chords->places;
     collide_status status;
+    double *pose;
     int k;
     begin_hit(hit);
     for (k = 0; k < 3; k++) if (!(fabs(ray->origin[k]) <= LARGEST)) return COLLIDE_INVALID_ARGUMENT;
     if (!take_direction(ray->space, ray->direction, cast->ray + RAY_VECTOR)) return COLLIDE_INVALID_ARGUMENT;
     if (!put_pose(ray->space, ray->X, ray->flags, 0)) return COLLIDE_INVALID_POSE;
+    pose = ray->chords->poses + (ray->compound != NULL ? POSE * ray->chords->n : 0);
+    memcpy(pose, ray->space->poses, POSE * sizeof *pose);
     ray->limit = ldexp(max_distance, (int)cast->exponent);
-    places.n = 0;
-    status = ray->mesh != NULL ? facet_of(ray, &places) : chord_of(ray, &places);
-    if (status == COLLIDE_OK) write_hit(ray, &places, hit);
+    places->n = 0;
+    status = ray->mesh != NULL ? facet_of(ray, places) : ends_of_chords(ray);
+    if (status == COLLIDE_OK) write_hit(ray, places, hit);
     return status;
 }
 
@@ -162,6 +205,8 @@ static collide_status cast_rays(struct ray *ray, const struct ray_question *aske
     int64_t step_x, step_o, step_d;
     collide_status status, worst = COLLIDE_OK;
     size_t n = asked->X.count, k, blamed = 0;
+    struct chords chords;
+    struct arena arena;
     rounding given;
     if (failed != NULL) *failed = 0;
     n = asked->origins.count != 1 ? asked->origins.count : n;
@@ -171,6 +216,14 @@ static collide_status cast_rays(struct ray *ray, const struct ray_question *aske
         !take_vectors(asked->directions, n, &of_d, &step_d))
         return COLLIDE_INVALID_ARGUMENT;
     if (cast_space_of(ray->space) == NULL) return COLLIDE_NO_MEMORY;
+    arena_begin(&arena);
+    if (!begin_chords(&chords, &arena, ray->compound != NULL ? (int64_t)ray->compound->n : 1)) {
+        arena_end(&arena);
+        return COLLIDE_NO_MEMORY;
+    }
+    chords.ints_at = ray->compound != NULL ? address_of(ray->compound->ints) : ray->space->header[INTS_AT];
+    chords.numbers_at = ray->compound != NULL ? address_of(ray->compound->numbers) : ray->space->header[NUMBERS_AT];
+    ray->chords = &chords;
     given = round_as_kernels_do();
     for (k = 0; k < n; k++) {
         ray->X = of_x + step_x * (int64_t)k;
@@ -183,6 +236,7 @@ static collide_status cast_rays(struct ray *ray, const struct ray_question *aske
         blamed = k;
     }
     round_as_before(given);
+    arena_end(&arena);
     if (failed != NULL) *failed = blamed;
     return worst;
 }
@@ -212,6 +266,7 @@ collide_status collide_raycast(collide_workspace *workspace, const collide_shape
     ray.space = workspace;
     ray.flags = flags;
     ray.mesh = NULL;
+    ray.compound = NULL;
     if (shape->ints[KIND] == POINTS && shape->numbers[RADIUS] == 0.0 && shape->numbers[SLOP] == 0.0 &&
         (status = surface_of(shape, &ray.mesh)) != COLLIDE_OK)
         return status;
@@ -230,5 +285,23 @@ collide_status collide_mesh_raycast(collide_workspace *workspace, const collide_
     ray.space = workspace;
     ray.flags = flags;
     ray.mesh = mesh;
+    ray.compound = NULL;
+    return cast_rays(&ray, &asked, failed);
+}
+
+collide_status collide_compound_raycast(collide_workspace *workspace, const collide_compound *compound, collide_poses X_WA,
+                                        collide_vectors origins, collide_vectors directions, double max_distance, unsigned flags,
+                                        collide_ray_hit *hits, collide_status *statuses, size_t *failed)
+{
+    struct ray_question asked = question_of(X_WA, origins, directions, max_distance, hits, statuses);
+    struct ray ray;
+    if (failed != NULL) *failed = 0;
+    if (workspace == NULL || compound == NULL) return COLLIDE_INVALID_ARGUMENT;
+    if (compound->is_whole)
+        return collide_raycast(workspace, compound->shapes[0], X_WA, origins, directions, max_distance, flags, hits, statuses, failed);
+    ray.space = workspace;
+    ray.flags = flags;
+    ray.mesh = NULL;
+    ray.compound = compound;
     return cast_rays(&ray, &asked, failed);
 }

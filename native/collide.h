@@ -455,7 +455,7 @@ typedef struct collide_ray_hit {
     double point[3];     /* in W [m]; zeros where nothing is met */
     int32_t facet;       /* of a mesh, or of the triangles of a box or hull; of cylinders and cones 0 round about, 1 below, 2 above, of
                             capsules 1 and 2 on the balls at their ends; else 0, or -1: nothing is met, or a hull is swept by a ball */
-    int32_t part;        /* 0; -1 where nothing is met */
+    int32_t part;        /* of a union its part, else 0; -1 where nothing is met */
     uint8_t hit;         /* 1 where a surface is met; also where rounding of curved shapes leaves that open */
     uint8_t certified;   /* 1 where hit or miss is proven, and the bracket is narrow */
     uint8_t reserved[6];
@@ -473,6 +473,12 @@ typedef struct collide_ray_hit {
 COLLIDE_API collide_status collide_raycast(collide_workspace *workspace, const collide_shape *shape, collide_poses X_WA,
                                            collide_vectors origins, collide_vectors directions, double max_distance, unsigned flags,
                                            collide_ray_hit *hits, collide_status *statuses, size_t *failed);
+
+/* The same of a union, whose parts are named by `part`; facet is -1 of polytopes, whose chords are told in closed form. Walls inside
+   other parts count, too. COLLIDE_UNSUPPORTED: a ray that begins or ends within rounding of a part with flat sides, or grazes it. */
+COLLIDE_API collide_status collide_compound_raycast(collide_workspace *workspace, const collide_compound *compound, collide_poses X_WA,
+                                                    collide_vectors origins, collide_vectors directions, double max_distance,
+                                                    unsigned flags, collide_ray_hit *hits, collide_status *statuses, size_t *failed);
 
 /* The same of a mesh. */
 COLLIDE_API collide_status collide_mesh_raycast(collide_workspace *workspace, const collide_mesh *mesh, collide_poses X_WA,

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 
-from collide.kernels import kernel, view_f64
-from collide.lowering.compound_table import MEASURE, TURNED
+from collide.kernels import entry, kernel, view_f64
+from collide.lowering.compound_table import MEASURE, PART, TURNED
 from collide.lowering.shape_table import (
     LOW_PARTS,
     POSE,
@@ -81,6 +81,15 @@ def place_part(poses, at, body, parts, part, terms_at):
     poses[at + POSE_SLOP] = PRODUCT_SLOP * (stretch * parts[part + MEASURE] + shift)
     if least > SAFE_PRODUCT or _are_safe(poses, body, parts, part):
         poses[at + POSE_TERMS] = float(at // POSE)
+
+
+@entry("int64(int64, int64, int64)")
+def place_all_parts(parts_at, n, poses_at):
+    """Write n rows of POSE doubles: where the parts of a body stand whose own pose is row n; returns 0."""
+    parts, poses = view_f64(parts_at, PART * n), view_f64(poses_at, POSE * (n + 1))
+    for k in range(n):
+        place_part(poses, POSE * k, POSE * n, parts, PART * k, 0)
+    return 0
 
 
 @kernel

@@ -123,6 +123,9 @@ _TYPES = {
     "collide_raycast": [
         c_void_p, c_void_p, Poses, Vectors, Vectors, c_double, c_uint, c_void_p, c_void_p, POINTER(c_size_t),
     ],
+    "collide_compound_raycast": [
+        c_void_p, c_void_p, Poses, Vectors, Vectors, c_double, c_uint, c_void_p, c_void_p, POINTER(c_size_t),
+    ],
     "collide_mesh_raycast": [
         c_void_p, c_void_p, Poses, Vectors, Vectors, c_double, c_uint, c_void_p, c_void_p, POINTER(c_size_t),
     ],
@@ -494,14 +497,14 @@ class Asker:
         )
         return status, rows, statuses, failed.value
 
-    def rays(self, shape: CShape | CMesh, X_WA, origins, directions, limit: float = math.inf, flags: int = 0):
-        """(status, rows, their statuses, number of the ray to blame)."""
+    def rays(self, shape, X_WA, origins, directions, limit: float = math.inf, flags: int = 0):
+        """(status, rows, their statuses, number of the ray to blame).   shape : a `CShape`, `CMesh` or `CCompound`."""
         X_WA, failed = _doubles(X_WA).reshape(-1, 4, 4), c_size_t(0)
         origins, directions = (_doubles(values).reshape(-1, 3) for values in (origins, directions))
         n = max(len(X_WA), len(origins), len(directions))
         rows, statuses = np.full(n, 7, dtype=RAY_HIT), np.full(n, -1, dtype=np.int32)
-        name = "collide_mesh_raycast" if isinstance(shape, CMesh) else "collide_raycast"
-        status = getattr(library(), name)(
+        name = {CMesh: "mesh_", CCompound: "compound_"}.get(type(shape), "")
+        status = getattr(library(), f"collide_{name}raycast")(
             self.handle, shape.handle, Poses(X_WA.ctypes.data, len(X_WA)), Vectors(origins.ctypes.data, len(origins)),
             Vectors(directions.ctypes.data, len(directions)), limit, flags, rows.ctypes.data, statuses.ctypes.data,
             failed,

@@ -208,3 +208,29 @@ def test_casts_have_pythons_bits_or_are_left_to_python():
             assert status == c.UNSUPPORTED and not row["hit"], (name, status)
             told["left"] += 1
     assert told["hit"] >= 45 and told["at start"] >= 20 and told["miss"] >= 20 and told["left"] <= 30, told
+
+
+def test_rays_have_pythons_bits_or_are_left_to_python():
+    asker, told = c.Asker(), {"met": 0, "missed": 0, "left": 0}
+    for number, ((_, A, _, X, _), pair) in enumerate(zip(drawn(), made())):
+        if not isinstance(A, collide.Compound):
+            continue
+        random, size = np.random.default_rng([115, number]), float(np.abs(A.poses[:, :3, 3]).max()) + 1e-2
+        origins = X[:3, 3] + size * random.normal(size=(6, 3)) * random.choice([0.3, 3.0], size=(6, 1))
+        middles = A.poses[random.integers(len(A.items), size=6), :3, 3] @ X[:3, :3].T + X[:3, 3]
+        ways = middles + 0.1 * size * random.normal(size=(6, 3)) - origins
+        limit = math.inf if number % 3 else 1.0
+        _, rows, statuses, _ = asker.rays(pair[0], X, origins, ways, limit)
+        hits = collide.raycast(A, X[None], origins, ways, max_distance=limit)
+        for k in range(6):
+            wanted = np.zeros((), dtype=c.RAY_HIT)
+            for field, values in hits._asdict().items():
+                if field != "starts":
+                    wanted[field] = values[k]
+            if statuses[k] == c.OK:
+                assert rows[k].tobytes() == wanted.tobytes(), (number, k, rows[k], wanted)
+                told["met" if rows[k]["hit"] else "missed"] += 1
+            else:
+                assert statuses[k] == c.UNSUPPORTED and not rows[k]["hit"], (number, k)
+                told["left"] += 1
+    assert told["met"] >= 250 and told["missed"] >= 250 and told["left"] <= 20, told
