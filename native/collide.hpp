@@ -20,8 +20,10 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <initializer_list>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
@@ -47,6 +49,8 @@ class Error : public std::runtime_error {
 public:
     explicit Error(collide_status status, std::size_t index = none)
         : std::runtime_error(text(status, index)), status_(status), index_(index) {}
+    Error(collide_status status, const std::string &message)
+        : std::runtime_error(text(status, none) + (message.empty() ? "" : ": " + message)), status_(status), index_(none) {}
     collide_status status() const noexcept { return status_; }
     // The number of the pair of a batch that is to blame; `none` of single calls.
     std::size_t index() const noexcept { return index_; }
@@ -146,7 +150,18 @@ struct Poses : Span<const Pose> {
     Poses(const Pose &one) : Span<const Pose>(&one, 1) {}
     operator collide_poses() const { return {empty() ? nullptr : data()->data(), size()}; }
 };
-inline std::size_t pairs_of(Poses A, Poses B) { return A.empty() || B.empty() ? 0 : std::max(A.size(), B.size()); }
+
+// Vectors of a batch, x y z of each; a single one goes with all.
+struct Vectors : Span<const double> {
+    using Span<const double>::Span;
+    std::size_t count() const { return rows<const double>(*this, 3); }
+    operator collide_vectors() const { return {data(), count()}; }
+};
+
+// How many rows a batch of so many each has: the most of them, 0 where there are none of one.
+inline std::size_t longest(std::initializer_list<std::size_t> counts) {
+    return std::min(counts) == 0 ? 0 : std::max(counts);
+}
 
 // --- owners ----------------------------------------------------------------------------------------------------------------
 
@@ -197,19 +212,32 @@ public:
     }
 };
 
+inline std::vector<const collide_shape *> handles_of(Span<const Shape> shapes) {
+    std::vector<const collide_shape *> made;
+    for (const Shape &shape : shapes) made.push_back(shape.get());
+    return made;
+}
+
 // Shapes under numbers, which it does not own: they outlive it.
 class ShapeSet : public Owner<collide_shape_set, collide_shape_set_free> {
 public:
     using Owner::Owner;
     explicit ShapeSet(Span<const collide_shape *const> shapes)
         : Owner(made(collide_shape_set_create, shapes.data(), shapes.size())) {}
-    explicit ShapeSet(Span<const Shape> shapes) : ShapeSet(handles(shapes)) {}
+    explicit ShapeSet(Span<const Shape> shapes) : ShapeSet(handles_of(shapes)) {}
+};
+
+// The union of shapes at poses in its frame. It does not own the shapes: they outlive it.
+class Compound : public Owner<collide_compound, collide_compound_free> {
+public:
+    using Owner::Owner;
+    Compound(Span<const collide_shape *const> shapes, Span<const Pose> X_CPs) : Owner(made_of(shapes, X_CPs)) {}
+    Compound(Span<const Shape> shapes, Span<const Pose> X_CPs) : Compound(handles_of(shapes), X_CPs) {}
 
 private:
-    static std::vector<const collide_shape *> handles(Span<const Shape> shapes) {
-        std::vector<const collide_shape *> made;
-        for (const Shape &shape : shapes) made.push_back(shape.get());
-        return made;
+    static collide_compound *made_of(Span<const collide_shape *const> shapes, Span<const Pose> X_CPs) {
+        if (shapes.size() != X_CPs.size() || shapes.empty()) throw Error(COLLIDE_INVALID_ARGUMENT);
+        return made(collide_compound_create, shapes.data(), X_CPs.data()->data(), shapes.size());
     }
 };
 
@@ -276,6 +304,19 @@ std::vector<Row> answers(std::size_t n, Ask ask) {
     return rows;
 }
 
+// All rows of a function that says how many there are where they are more than it has room for; `width` elements a row.
+template <class Row, class Ask>
+std::vector<Row> all_rows(Ask ask, std::size_t width = 1) {
+    std::vector<Row> rows(64 * width);
+    for (;;) {
+        std::size_t count = 0;
+        collide_status status = ask(rows.data(), rows.size() / width, &count);
+        if (status != COLLIDE_TOO_MANY) require(status);
+        rows.resize(count * width);
+        if (status != COLLIDE_TOO_MANY) return rows;
+    }
+}
+
 // Rows of contacts of many pairs: those of pair k are starts[k] to starts[k + 1] - 1.
 struct Contacts {
     std::vector<collide_contact> rows;
@@ -317,6 +358,9 @@ public:
     bool collides(const Mesh &A, const Mesh &B, const Pose &X_WA, const Pose &X_WB, unsigned flags = 0) {
         return boolean(collide_mesh_collide, A, B, X_WA, X_WB, flags);
     }
+    bool collides(const Mesh &mesh, const Shape &shape, const Pose &X_WM, const Pose &X_WS, unsigned flags = 0) {
+        return boolean(collide_mesh_shape_collide, mesh, shape, X_WM, X_WS, flags);
+    }
     bool collides(const Field &field, const Shape &shape, const Pose &X_WF, const Pose &X_WS, unsigned flags = 0) {
         return boolean(collide_field_collide, field, shape, X_WF, X_WS, flags);
     }
@@ -328,6 +372,10 @@ public:
     collide_pair distance(const Mesh &A, const Mesh &B, const Pose &X_WA, const Pose &X_WB, unsigned flags = 0) {
         return row(collide_mesh_distance, A, B, X_WA, X_WB, flags);
     }
+    collide_pair distance(const Mesh &mesh, const Shape &shape, const Pose &X_WM, const Pose &X_WS,
+                          unsigned flags = COLLIDE_UNSIGNED) {
+        return row(collide_mesh_shape_distance, mesh, shape, X_WM, X_WS, flags);
+    }
     collide_pair distance(const Field &field, const Shape &shape, const Pose &X_WF, const Pose &X_WS,
                           double max_distance = infinity, unsigned flags = COLLIDE_UNSIGNED) {
         return row(collide_field_distance, field, shape, X_WF, X_WS, max_distance, flags);
@@ -335,13 +383,25 @@ public:
 
     std::vector<std::uint8_t> collides_batch(const Shape &A, const Shape &B, Poses X_WA, Poses X_WB, unsigned flags = 0,
                                              Span<double> axes = {}) {
-        std::size_t n = pairs_of(X_WA, X_WB);
+        std::size_t n = longest({X_WA.size(), X_WB.size()});
         return answers<std::uint8_t>(n, [&](std::uint8_t *hits, std::size_t *failed) {
             return collide_collide_batch(get(), A.get(), B.get(), X_WA, X_WB, flags, checked(axes, n), hits, failed);
         });
     }
+    std::vector<std::uint8_t> collides_batch(const Compound &A, const Compound &B, Poses X_WA, Poses X_WB, unsigned flags = 0) {
+        return answers<std::uint8_t>(longest({X_WA.size(), X_WB.size()}), [&](std::uint8_t *hits, std::size_t *failed) {
+            return collide_compound_collide(get(), A.get(), B.get(), X_WA, X_WB, flags, hits, failed);
+        });
+    }
+    // Whether A and B are at most a margin apart.
+    std::vector<std::uint8_t> within_batch(const Shape &A, const Shape &B, Poses X_WA, Poses X_WB, double margin,
+                                           unsigned flags = 0) {
+        return answers<std::uint8_t>(longest({X_WA.size(), X_WB.size()}), [&](std::uint8_t *within, std::size_t *failed) {
+            return collide_within(get(), A.get(), B.get(), X_WA, X_WB, margin, flags, within, failed);
+        });
+    }
     std::vector<std::uint8_t> collides_batch(const Field &field, const Shape &shape, Poses X_WF, Poses X_WS, unsigned flags = 0) {
-        return answers<std::uint8_t>(pairs_of(X_WF, X_WS), [&](std::uint8_t *hits, std::size_t *failed) {
+        return answers<std::uint8_t>(longest({X_WF.size(), X_WS.size()}), [&](std::uint8_t *hits, std::size_t *failed) {
             return collide_field_collide_batch(get(), field.get(), shape.get(), X_WF, X_WS, flags, hits, failed);
         });
     }
@@ -355,13 +415,19 @@ public:
 
     std::vector<collide_pair> distance_batch(const Shape &A, const Shape &B, Poses X_WA, Poses X_WB,
                                              double max_distance = infinity, unsigned flags = 0) {
-        return answers<collide_pair>(pairs_of(X_WA, X_WB), [&](collide_pair *pairs, std::size_t *failed) {
+        return answers<collide_pair>(longest({X_WA.size(), X_WB.size()}), [&](collide_pair *pairs, std::size_t *failed) {
             return collide_distance_batch(get(), A.get(), B.get(), X_WA, X_WB, max_distance, flags, pairs, failed);
+        });
+    }
+    std::vector<collide_pair> distance_batch(const Compound &A, const Compound &B, Poses X_WA, Poses X_WB,
+                                             double max_distance = infinity, unsigned flags = 0) {
+        return answers<collide_pair>(longest({X_WA.size(), X_WB.size()}), [&](collide_pair *pairs, std::size_t *failed) {
+            return collide_compound_distance(get(), A.get(), B.get(), X_WA, X_WB, max_distance, flags, pairs, failed);
         });
     }
     Answered<collide_pair> distance_batch(const Field &field, const Shape &shape, Poses X_WF, Poses X_WS,
                                           double max_distance = infinity, unsigned flags = COLLIDE_UNSIGNED) {
-        return answered<collide_pair>(pairs_of(X_WF, X_WS), [&](auto... out) {
+        return answered<collide_pair>(longest({X_WF.size(), X_WS.size()}), [&](auto... out) {
             return collide_field_distance_batch(get(), field.get(), shape.get(), X_WF, X_WS, max_distance, flags, out...);
         });
     }
@@ -384,7 +450,7 @@ public:
     }
     Contacts contacts_batch(const Shape &A, const Shape &B, Poses X_WA, Poses X_WB, double margin = 0.0,
                             std::size_t max_contacts = 4, unsigned flags = 0) {
-        return many_contacts(pairs_of(X_WA, X_WB), max_contacts, [&](auto... out) {
+        return many_contacts(longest({X_WA.size(), X_WB.size()}), max_contacts, [&](auto... out) {
             return collide_contacts_batch(get(), A.get(), B.get(), X_WA, X_WB, margin, max_contacts, flags, out...);
         });
     }
@@ -396,7 +462,56 @@ public:
         });
     }
 
+    std::vector<collide_contact> contacts(const Mesh &A, const Mesh &B, const Pose &X_WA, const Pose &X_WB, double margin = 0.0,
+                                          std::size_t max_contacts = 4, unsigned flags = 0) {
+        return all_rows<collide_contact>([&](auto... out) {
+            return collide_mesh_contacts(get(), A.get(), B.get(), X_WA.data(), X_WB.data(), margin, max_contacts, flags, out...);
+        });
+    }
+    std::vector<collide_contact> contacts(const Compound &A, const Compound &B, const Pose &X_WA, const Pose &X_WB,
+                                          double margin = 0.0, std::size_t max_contacts = 4, unsigned flags = 0) {
+        return all_rows<collide_contact>([&](auto... out) {
+            return collide_compound_contacts(get(), A.get(), B.get(), X_WA.data(), X_WB.data(), margin, max_contacts, flags,
+                                             out...);
+        });
+    }
+
+    // How far A can be moved along a direction until it touches B.
+    Answered<collide_first_contact> cast_batch(const Shape &A, const Shape &B, Poses X_WA, Poses X_WB, Vectors directions,
+                                               double max_distance = infinity, unsigned flags = 0) {
+        std::size_t n = longest({X_WA.size(), X_WB.size(), directions.count()});
+        return answered<collide_first_contact>(n, [&](auto... out) {
+            return collide_cast_batch(get(), A.get(), B.get(), X_WA, X_WB, directions, max_distance, flags, out...);
+        });
+    }
+    // When A and B first touch on their ways from the first poses to the second, turning the shortest way.
+    Answered<collide_time_of_impact> impact_batch(const Shape &A, const Shape &B, Poses X_WA0, Poses X_WA1, Poses X_WB0,
+                                                  Poses X_WB1, double tolerance = 1e-9, unsigned flags = 0) {
+        std::size_t n = longest({X_WA0.size(), X_WA1.size(), X_WB0.size(), X_WB1.size()});
+        const collide_motions motions = {X_WA0, X_WA1, X_WB0, X_WB1, {nullptr, 1}, {nullptr, 1}};
+        return answered<collide_time_of_impact>(n, [&](auto... out) {
+            return collide_impact_batch(get(), A.get(), B.get(), &motions, tolerance, flags, out...);
+        });
+    }
+    // Where rays first meet a shape or a mesh.
+    Answered<collide_ray_hit> raycast(const Shape &shape, Poses X_WA, Vectors origins, Vectors directions,
+                                      double max_distance = infinity, unsigned flags = 0) {
+        return rays(collide_raycast, shape, X_WA, origins, directions, max_distance, flags);
+    }
+    Answered<collide_ray_hit> raycast(const Mesh &mesh, Poses X_WA, Vectors origins, Vectors directions,
+                                      double max_distance = infinity, unsigned flags = 0) {
+        return rays(collide_mesh_raycast, mesh, X_WA, origins, directions, max_distance, flags);
+    }
+
 private:
+    template <class Function, class Target>
+    Answered<collide_ray_hit> rays(Function ask, const Target &target, Poses X_WA, Vectors origins, Vectors directions,
+                                   double max_distance, unsigned flags) {
+        std::size_t n = longest({X_WA.size(), origins.count(), directions.count()});
+        return answered<collide_ray_hit>(n, [&](auto... out) {
+            return ask(get(), target.get(), X_WA, origins, directions, max_distance, flags, out...);
+        });
+    }
     template <class Function, class A, class B>
     bool boolean(Function ask, const A &a, const B &b, const Pose &X_WA, const Pose &X_WB, unsigned flags) {
         int hit = 0;
@@ -425,6 +540,128 @@ private:
     }
 };
 
+// --- worlds ----------------------------------------------------------------------------------------------------------------
+
+// Bodies that move, and questions about all of them. It owns no shape, mesh or field: they outlive their bodies. Questions change
+// nothing: threads ask at once, each with its own workspace, while nobody changes the world.
+class World : public Owner<collide_world, collide_world_free> {
+public:
+    using Owner::Owner;
+    World() : Owner(made(collide_world_create)) {}
+
+    std::int32_t add(const Shape &shape, const Pose &X_WB = {}, bool is_static = false, std::uint32_t group = 1u,
+                     std::uint32_t mask = 0xFFFFu) {
+        return added(&collide_body::shape, shape.get(), X_WB, is_static, group, mask);
+    }
+    std::int32_t add(const Mesh &mesh, const Pose &X_WB = {}, bool is_static = false, std::uint32_t group = 1u,
+                     std::uint32_t mask = 0xFFFFu) {
+        return added(&collide_body::mesh, mesh.get(), X_WB, is_static, group, mask);
+    }
+    std::int32_t add(const Field &field, const Pose &X_WB = {}, bool is_static = false, std::uint32_t group = 1u,
+                     std::uint32_t mask = 0xFFFFu) {
+        return added(&collide_body::field, field.get(), X_WB, is_static, group, mask);
+    }
+    std::vector<std::int32_t> add(Span<const collide_body> bodies) {
+        std::vector<std::int32_t> ids(bodies.size());
+        changed(collide_world_add(get(), bodies.data(), bodies.size(), ids.data()));
+        return ids;
+    }
+    void remove(std::int32_t id) { changed(collide_world_remove(get(), id)); }
+    void move(std::int32_t id, const Pose &X_WB) { changed(collide_world_move(get(), &id, 1, X_WB.data())); }
+    void move(Span<const std::int32_t> ids, Span<const Pose> X_WBs) {
+        if (ids.size() != X_WBs.size()) throw Error(COLLIDE_INVALID_ARGUMENT);
+        if (!ids.empty()) changed(collide_world_move(get(), ids.data(), ids.size(), X_WBs.data()->data()));
+    }
+    void replace(std::int32_t id, const Shape &shape) { changed(collide_world_replace(get(), id, shape.get())); }
+    void replace(std::int32_t id, const Mesh &mesh) { changed(collide_world_replace_mesh(get(), id, mesh.get())); }
+    void replace(std::int32_t id, const Field &field) { changed(collide_world_replace_field(get(), id, field.get())); }
+    void sleep(Span<const std::int32_t> ids, bool asleep = true) {
+        changed(collide_world_sleep(get(), ids.data(), ids.size(), asleep));
+    }
+    // pairs : two ids each, never tested from now on.
+    void allow(Span<const std::int32_t> pairs) { changed(collide_world_allow(get(), pairs.data(), rows(pairs, 2))); }
+
+    std::size_t size() const { return collide_world_size(get()); }
+    Pose pose(std::int32_t id) const {
+        Pose X_WB;
+        require(collide_world_pose(get(), id, X_WB.m.data()));
+        return X_WB;
+    }
+
+    bool collides(Workspace &space) const {
+        int hit = 0;
+        told(space, collide_world_collides(get(), space.get(), &hit));
+        return hit != 0;
+    }
+    // Pairs that hit: two ids each.
+    std::vector<std::int32_t> hits(Workspace &space) const { return all<std::int32_t>(space, 2, collide_world_hits); }
+    std::vector<collide_pair> collisions(Workspace &space) const { return all<collide_pair>(space, 1, collide_world_collisions); }
+    std::vector<collide_pair> distances(Workspace &space, double max_distance = infinity) const {
+        return all<collide_pair>(space, 1, collide_world_distances, max_distance);
+    }
+    std::optional<collide_pair> minimum(Workspace &space, double max_distance = infinity) const {
+        collide_pair row;
+        std::size_t count = 0;
+        told(space, collide_world_minimum(get(), space.get(), max_distance, &row, &count));
+        return count == 0 ? std::nullopt : std::optional<collide_pair>(row);
+    }
+    std::vector<collide_contact> contacts(Workspace &space, double margin = 0.0, std::size_t max_contacts = 4) const {
+        return all<collide_contact>(space, 1, collide_world_contacts, margin, max_contacts);
+    }
+    std::vector<collide_pair> query(Workspace &space, const Shape &shape, const Pose &X_WS, double max_distance = 0.0) const {
+        return all<collide_pair>(space, 1, collide_world_query, static_cast<const collide_shape *>(shape.get()), X_WS.data(),
+                                 max_distance);
+    }
+    std::vector<std::int32_t> boxes_near(Workspace &space, const Vector &low_W, const Vector &high_W, double margin = 0.0) const {
+        return all<std::int32_t>(space, 1, collide_world_boxes_near, low_W.data(), high_W.data(), margin);
+    }
+    // The first body on each ray, x y z of origins and directions.
+    Answered<collide_world_hit> raycast(Workspace &space, Span<const double> origins_W, Span<const double> directions_W,
+                                        double max_distance = infinity) const {
+        std::size_t n = rows(origins_W, 3);
+        if (directions_W.size() != origins_W.size()) throw Error(COLLIDE_INVALID_ARGUMENT);
+        Answered<collide_world_hit> found{std::vector<collide_world_hit>(n), std::vector<collide_status>(n)};
+        collide_status status = collide_world_raycast(get(), space.get(), origins_W.data(), directions_W.data(), n, max_distance,
+                                                      nullptr, nullptr, found.rows.data(), found.statuses.data());
+        if (status != COLLIDE_UNSUPPORTED) told(space, status);
+        return found;
+    }
+    // The body nearest to each point, x y z of each.
+    std::vector<collide_world_hit> nearest(Workspace &space, Span<const double> points_W, double max_distance = infinity) const {
+        std::vector<collide_world_hit> found(rows(points_W, 3));
+        told(space, collide_world_nearest(get(), space.get(), points_W.data(), found.size(), max_distance, nullptr, nullptr,
+                                          found.data()));
+        return found;
+    }
+
+private:
+    template <class Kind>
+    std::int32_t added(const Kind *collide_body::*of, const Kind *what, const Pose &X_WB, bool is_static, std::uint32_t group,
+                       std::uint32_t mask) {
+        collide_body body = COLLIDE_BODY_DEFAULT;
+        body.*of = what;
+        body.X_WB = X_WB.data();
+        body.is_static = is_static;
+        body.group = group;
+        body.mask = mask;
+        return add(Span<const collide_body>(&body, 1)).front();
+    }
+    void changed(collide_status status) const {
+        if (status != COLLIDE_OK) throw Error(status, collide_world_message(get()));
+    }
+    static void told(const Workspace &space, collide_status status) {
+        if (status != COLLIDE_OK) throw Error(status, collide_workspace_message(space.get()));
+    }
+    template <class Row, class Function, class... Arguments>
+    std::vector<Row> all(Workspace &space, std::size_t width, Function ask, Arguments... arguments) const {
+        return all_rows<Row>([&](auto... out) {
+            collide_status status = ask(get(), space.get(), arguments..., out...);
+            if (status != COLLIDE_TOO_MANY) told(space, status);
+            return status;
+        }, width);
+    }
+};
+
 // --- robots ----------------------------------------------------------------------------------------------------------------
 
 // A robot among obstacles, from a file of Python's collide.RobotChecker.save.
@@ -448,6 +685,11 @@ private:
 // Nearest pairs, and their derivatives by the columns, a row each.
 struct RobotDistances : Answered<collide_pair> {
     std::vector<double> gradients;
+};
+
+// Pairs of many configurations: those of configuration k are starts[k] to starts[k + 1] - 1.
+struct RobotPairs : RobotDistances {
+    std::vector<std::size_t> starts;
 };
 
 // Verdicts COLLIDE_MOTION_..., with times of collisions, NaN of others.
@@ -476,6 +718,24 @@ public:
                                           out...);
         });
         return {std::move(found), std::move(gradients)};
+    }
+    // All pairs of bodies within a distance.
+    RobotPairs near(Span<const double> configurations, double max_distance,
+                    unsigned between = COLLIDE_WITH_AROUND | COLLIDE_AMONG_ROBOT) {
+        std::size_t n = rows(configurations, columns_), capacity = 16 * n + 64, failed = none;
+        RobotPairs found;
+        found.starts.resize(n + 1);
+        found.statuses.resize(n);
+        for (collide_status status = COLLIDE_TOO_MANY; status == COLLIDE_TOO_MANY; capacity *= 4) {
+            found.rows.resize(capacity);
+            found.gradients.resize(capacity * columns_);
+            status = collide_robot_near(get(), configurations.data(), n, max_distance, between, found.rows.data(),
+                                        found.gradients.data(), capacity, found.starts.data(), found.statuses.data(), &failed);
+            if (status != COLLIDE_TOO_MANY && status != COLLIDE_UNSUPPORTED) require(status, failed);
+        }
+        found.rows.resize(found.starts[n]);
+        found.gradients.resize(found.starts[n] * columns_);
+        return found;
     }
     // Straight motions from row to row, proven free or found to collide.
     RobotMotions certify(Span<const double> first, Span<const double> last, double resolution = 1e-3) {

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from naive import rng_of
+from random_robots import random_configurations, random_robot
 
 import collide
 from collide.contact.contact_rows import CONTACT_DTYPE
@@ -187,6 +189,199 @@ def _contacts(asked: list) -> np.ndarray:
     rows = [collide.contacts(*pair, margin=0.06, max_contacts=4).rows for pair in asked]
     assert sum(map(len, rows)) > 4 and rows[0].dtype == CONTACT_DTYPE
     return np.concatenate(rows)
+
+
+_BODIES = r"""
+#include <collide.hpp>
+#include <cstdio>
+using namespace collide;
+
+template <class... Numbers> void say(const char *what, Numbers... numbers) {
+    std::printf("%s", what);
+    (std::printf(" %.17g", double(numbers)), ...);
+    std::printf("\n");
+}
+template <class Rows> void distances(const char *what, const Rows &rows) {
+    for (const auto &row : rows) say(what, row.a, row.b, row.distance, row.lower, row.upper);
+}
+
+int main() {
+    Workspace space;
+    Shape block = Shape::box({0.4, 0.5, 0.6}), ball = Shape::sphere(0.3), rod = Shape::cylinder(0.1, 0.8);
+    const Pose here, up = Pose::at(0.1, 0.0, 1.5);
+    const std::array<double, 12> vertices = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+    const std::array<std::int32_t, 12> faces = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
+    Mesh mesh(vertices, faces), other(block);
+    std::vector<Pose> fall = {up, Pose::at(0.1, 0.0, 0.55), Pose::at(0.1, 0.0, 0.9)};
+
+    for (auto hit : space.within_batch(block, ball, here, fall, 0.31)) say("within", hit);
+    for (const auto &row : space.cast_batch(ball, block, fall, here, Vector{0.0, 0.1, -2.0}, 5.0).rows)
+        say("cast", row.distance, row.lower, row.upper, row.hit);
+    for (const auto &row : space.impact_batch(rod, block, up, Pose::at(0.1, 0.3, -1.0), here, here, 1e-10).rows)
+        say("impact", row.time, row.lower, row.upper, row.hit);
+    const std::vector<double> origins = {0.1, 0.1, 3.0, 2.0, 2.0, 3.0}, down = {0.0, 0.01, -1.0};
+    const std::vector<double> ways = {0.0, 0.01, -1.0, 0.0, 0.01, -1.0};
+    for (const auto &row : space.raycast(block, here, origins, down).rows) say("ray", row.distance, row.hit);
+    for (const auto &row : space.raycast(mesh, here, origins, down).rows)
+        say("ray at mesh", row.distance, row.hit, row.facet);
+    say("mesh", space.collides(mesh, ball, here, up), space.collides(mesh, ball, here, here),
+        space.distance(mesh, ball, here, up).distance);
+    for (const auto &row : space.contacts(mesh, other, here, Pose::at(0.2, 0.25, -0.299), 0.01))
+        say("patch", row.distance);
+
+    const collide_shape *parts[] = {block.get(), ball.get()};
+    const Pose places[] = {here, Pose::at(0.0, 0.0, 0.5)};
+    Compound gripper(parts, places), single(Span<const collide_shape *const>(parts, 1), Span<const Pose>(places, 1));
+    for (auto hit : space.collides_batch(gripper, single, here, fall)) say("union", hit);
+    distances("of union", space.distance_batch(gripper, single, here, fall));
+    for (const auto &row : space.contacts(gripper, single, here, Pose::at(0.0, 0.0, -0.61), 0.02))
+        say("of parts", row.distance);
+
+    World world;
+    std::int32_t floor = world.add(block, Pose(), true), top = world.add(ball, up);
+    std::int32_t third = world.add(mesh, Pose::at(3.0, 0.0, 0.0)), last = world.add(rod, Pose::at(5.0, 0.0, 0.0));
+    say("ids", floor, top, third, last, world.size());
+    say("none", world.collides(space), world.hits(space).size());
+    world.move(top, Pose::at(0.1, 0.0, 0.55));
+    world.move(std::vector<std::int32_t>{last}, std::vector<Pose>{Pose::at(-1.0, 0.0, 0.0)});
+    say("pose", world.pose(last)(0, 3), world.collides(space), world.hits(space)[0], world.hits(space)[1]);
+    distances("collision", world.collisions(space));
+    distances("near", world.distances(space, 0.9));
+    say("minimum", world.minimum(space)->distance, world.minimum(space, 0.0).has_value());
+    for (const auto &row : world.contacts(space, 0.01)) say("contact", row.a, row.b, row.distance);
+    distances("query", world.query(space, rod, Pose::at(0.0, 0.0, 1.5), 1.0));
+    for (auto id : world.boxes_near(space, {-2.0, -1.0, -1.0}, {0.0, 1.0, 1.0})) say("box", id);
+    world.remove(third);
+    for (const auto &row : world.raycast(space, origins, ways).rows) say("world ray", row.body, row.distance);
+    for (const auto &row : world.nearest(space, origins)) say("nearest", row.body, row.distance);
+    world.allow(std::vector<std::int32_t>{floor, top});
+    say("allowed", world.collides(space));
+    try {
+        world.move(99, here);
+    } catch (const Error &error) {
+        std::printf("%s\n", error.what());
+    }
+}
+"""
+
+
+def _said(what: str, *numbers) -> list[str]:
+    """A line of the program for each row of columns of numbers."""
+    rows = np.atleast_2d(np.array([np.atleast_1d(column) for column in numbers], dtype=float).T)
+    return [" ".join([what, *(format(value, ".17g") for value in row)]) for row in rows.tolist()]
+
+
+def _pairs(what: str, result) -> list[str]:
+    return _said(what, *(result.rows[field] for field in ("a", "b", "distance", "lower", "upper")))
+
+
+def test_unions_casts_and_worlds_are_pythons(tmp_path):
+    block, ball, rod = collide.Box(0.4, 0.5, 0.6), collide.Sphere(0.3), collide.Cylinder(0.1, 0.8)
+    mesh = collide.Mesh(np.vstack([np.zeros(3), np.eye(3)]), [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    here, up, fall = np.eye(4), _at(0.1, 0, 1.5), np.array([_at(0.1, 0, z) for z in (1.5, 0.55, 0.9)])
+    lines = _said("within", collide.collide(block, ball, here, fall, security_margin=0.31))
+    cast = collide.shape_cast(ball, fall, [0.0, 0.1, -2.0], block, here, max_distance=5.0)
+    lines += _said("cast", cast.distance, cast.lower, cast.upper, cast.hit)
+    impact = collide.time_of_impact(rod, block, up, _at(0.1, 0.3, -1), here, here, tolerance=1e-10)
+    lines += _said("impact", impact.time, impact.lower, impact.upper, impact.hit)
+    origins, down = [[0.1, 0.1, 3.0], [2.0, 2.0, 3.0]], [0.0, 0.01, -1.0]
+    ray, at_mesh = (collide.raycast(shape, here, origins, down) for shape in (block, mesh))
+    lines += _said("ray", ray.distance, ray.hit) + _said("ray at mesh", at_mesh.distance, at_mesh.hit, at_mesh.facet)
+    far = collide.distance(mesh, ball, here, up, signed=False).distance
+    lines += _said("mesh", collide.collide(mesh, ball, here, up), collide.collide(mesh, ball, here, here), far)
+    lines += _said("patch", collide.contacts(mesh, block, here, _at(0.2, 0.25, -0.299), margin=0.01).distance)
+    gripper = collide.Compound([(block, here), (ball, _at(0, 0, 0.5))])
+    lines += _said("union", collide.collide(gripper, block, here, fall))
+    lines += _pairs("of union", collide.distance(gripper, block, here, fall))
+    lines += _said("of parts", collide.contacts(gripper, block, here, _at(0, 0, -0.61), margin=0.02).distance)
+    lines += _of_world(block, ball, rod, mesh, up, np.array(origins), np.array([down, down]))
+    assert _run(_built(tmp_path, _BODIES)).decode().splitlines() == lines
+
+
+def _of_world(block, ball, rod, mesh, up, origins, ways) -> list[str]:
+    world = collide.World()
+    world.add(block, static=True, name="0")
+    world.add(ball, up, name="1")
+    world.add(mesh, _at(3, 0, 0), name="2")
+    world.add(rod, _at(5, 0, 0), name="3")
+    lines = [*_said("ids", 0, 1, 2, 3, 4), *_said("none", world.collides(), len(world.collisions()))]
+    world.set_pose("1", _at(0.1, 0, 0.55))
+    world.set_pose("3", _at(-1, 0, 0))
+    lines += _said("pose", -1.0, world.collides(), 0, 1) + _pairs("collision", world.collisions())
+    lines += _pairs("near", world.distances(max_distance=0.9))
+    lines += _said("minimum", world.minimum().rows["distance"][0], 1)
+    contacts = world.contacts(margin=0.01)
+    lines += _said("contact", *(contacts.rows[field] for field in ("a", "b", "distance")))
+    lines += _pairs("query", world.query(rod, _at(0, 0, 1.5), max_distance=1.0))
+    lines += _said("box", [int(name) for name in world.boxes_near([-2, -1, -1], [0, 1, 1])])
+    world.remove("2")
+    rays, nearest = world.raycast(origins, ways), world.nearest(origins)
+    for what, found in (("world ray", rays), ("nearest", nearest)):
+        lines += _said(what, [-1 if name is None else int(name) for name in found.names], found["distance"])
+    world.allow("0", "1")
+    lines += _said("allowed", world.collides())
+    refused = "collide_world_move: ids[0]: no body has id 99; it may have been removed"
+    return [*lines, f"collide: an argument is NULL or outside its range: {refused}"]
+
+
+_ROBOT = r"""
+#include <collide.hpp>
+#include <cstdio>
+using namespace collide;
+
+template <class Rows> void put(const Rows &rows) { std::fwrite(rows.data(), sizeof *rows.data(), rows.size(), stdout); }
+
+int main() {
+    Robot robot = Robot::load("robot.collide");
+    RobotWorkspace space(robot);
+    std::vector<double> q(40 * robot.columns());
+    std::FILE *file = std::fopen("q.bin", "rb");
+    if (file == nullptr || std::fread(q.data(), sizeof(double), q.size(), file) != q.size()) return 2;
+    std::fclose(file);
+    const std::size_t half = q.size() / 2;
+    const Span<const double> first(q.data(), half), last(q.data() + half, half);
+    put(space.collides(q).rows);
+    RobotDistances nearest = space.distances(q, infinity, COLLIDE_WITH_AROUND);
+    for (const collide_pair &row : nearest.rows) put(std::array<double, 3>{row.distance, row.lower, double(row.b)});
+    put(nearest.gradients);
+    RobotPairs near = space.near(q, 5.0);
+    put(near.starts);
+    put(near.gradients);
+    RobotMotions certified = space.certify(first, last, 0.05), sampled = space.sample(first, last, 0.05);
+    put(certified.rows);
+    put(certified.times);
+    put(sampled.rows);
+    if (robot.column_name(0).empty() || robot.body_name(0).empty() || robot.body_name(-1) != "ball") return 5;
+    try {
+        space.collides({q.data(), robot.columns() + 1});
+        return 3;
+    } catch (const Error &error) {
+        return error.status() == COLLIDE_INVALID_ARGUMENT ? 0 : 4;
+    }
+}
+"""
+
+
+def test_robots_are_pythons(tmp_path):
+    rng, world = rng_of("a robot in C++ 0"), collide.World()
+    world.add(collide.Sphere(0.1), _at(0.4, 0, 0), name="ball")
+    world.add(collide.Box(0.2, 0.2, 0.2), _at(-0.4, 0.2, 0), name="crate")
+    robot = random_robot(rng, types=("revolute", "prismatic"), size=0.03)
+    checker, q = collide.RobotChecker(robot, world), random_configurations(rng, robot, 40)
+    checker.save(tmp_path / "robot.collide")
+    q.tofile(tmp_path / "q.bin")
+    told = _run(_built(tmp_path, _ROBOT))
+    hits, nearest = checker.collides(q), checker.distances(q, between="world")
+    pairs = checker.distances(q, max_distance=5.0, per="pair")
+    edges = checker.certify_edges(q[:20], q[20:], resolution=0.05)
+    verdicts = np.where(edges.free, 1, np.where(edges.collides, 2, 0)).astype(np.uint8)
+    assert 0 < hits.sum() < 40 and len(pairs) > 64 + 16 * 40 and len(np.unique(verdicts)) > 1
+    sampled = checker.edge_collides(q[:20], q[20:], resolution=0.05)
+    wanted = [
+        hits.astype(np.uint8), np.stack([nearest.distance, nearest.lower, nearest.b], axis=1).astype(float),
+        nearest.gradient, pairs.starts, pairs.gradient, verdicts, edges.time, sampled.astype(np.uint8),
+    ]
+    assert told == b"".join(column.tobytes() for column in wanted)
 
 
 _OWNERS = r"""
