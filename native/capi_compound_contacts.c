@@ -13,7 +13,7 @@ enum {
     B_SLACK_AT, B_OUT_AT, B_CAPACITY, B_ENDS_AT, B_PLACES_AT = B_ENDS_AT + 3, CONTACTS_HEADER = B_PLACES_AT + 4
 };
 /* What `write_contact_constants` writes (collide/contact/contact_constants.py). */
-enum { B_COMPOUND_HEADER = 5, CONTACT_MEASURES };
+enum { B_COMPOUND_HEADER = 5, CONTACT_MEASURES = B_COMPOUND_HEADER + 5 };
 /* Contacts that a call has space for, besides those of a last pair. */
 static const size_t MAX_ROWS = 1024;
 

@@ -110,15 +110,22 @@ static void take_field(collide_workspace *space, const collide_field *field, con
     space->field->header[RADII_AT] = address_of(field->radii);
 }
 
-int64_t ask_facets(collide_workspace *space, const collide_mesh *mesh, const collide_shape *shape, const double *X_WM,
-                   const double *X_WS, int boolean, int depths, collide_pair *row)
+const int64_t *facet_walk(collide_workspace *space, const collide_mesh *mesh, const collide_shape *shape)
 {
     const double *largest = mesh->numbers + CORNER;
     double reach = sqrt(largest[0] * largest[0] + largest[1] * largest[1] + largest[2] * largest[2]) + mesh->radius;
-    int64_t header_at = address_of(space->field->header), state = 0, place, how, m[MEASURES];
+    int64_t m[MEASURES];
     workspace_sizes(space->kernels, m);
-    if (m[M_WIDTH] * (mesh->depth + 2) > m[M_CELL_STACK]) return LONG_WAY;
+    if (m[M_WIDTH] * (mesh->depth + 2) > m[M_CELL_STACK]) return NULL;
     take_items(space, FACETS, mesh->tree, 3, reach, 0.0, shape);
+    return space->field->header;
+}
+
+int64_t ask_facets(collide_workspace *space, const collide_mesh *mesh, const collide_shape *shape, const double *X_WM,
+                   const double *X_WS, int boolean, int depths, collide_pair *row)
+{
+    int64_t header_at = address_of(facet_walk(space, mesh, shape)), state = 0, place, how;
+    if (header_at == 0) return LONG_WAY;
     if (!boolean)
         return space->kernels->curved_gap_single(header_at, address_of(X_WM), address_of(X_WS), address_of(row), (uint8_t)depths, INFINITE);
     space->kernels->curved_states_of(header_at, address_of(X_WM), address_of(X_WS), 1, 0.0, address_of(&state), address_of(&place),

@@ -94,6 +94,7 @@ struct impact_space;
 struct compound_space;
 struct mesh_contact_space;
 struct compound_contact_space;
+struct curved_contact_space;
 struct collide_mesh;
 struct world_space;
 
@@ -153,6 +154,7 @@ struct collide_workspace {
     struct compound_space *compound; /* of unions; NULL until some are asked about */
     struct mesh_contact_space *mesh_contacts; /* NULL until some are asked for */
     struct compound_contact_space *compound_contacts; /* the same of unions */
+    struct curved_contact_space *curved_contacts; /* the same of curved shapes and meshes */
     struct collide_mesh *middle; /* a point at the origin, as a body of facets; NULL until it is asked for */
     struct world_space *world;       /* of worlds; NULL until one is asked */
     char message[240];               /* of the last question about a world */

@@ -28,9 +28,20 @@ struct collide_mesh {
 enum { LONG_WAY = -1, MAYBE_INSIDE, APART, MEETS };
 int64_t ask_facets(collide_workspace *space, const collide_mesh *mesh, const collide_shape *shape, const double *X_WM,
                    const double *X_WS, int boolean, int depths, collide_pair *row);
+/* The header of such a walk; NULL of a tree too deep for it. */
+const int64_t *facet_walk(collide_workspace *space, const collide_mesh *mesh, const collide_shape *shape);
+
+/* capi_curved_contacts.c */
+void free_curved_contacts(struct curved_contact_space *space);
 
 /* capi_mesh_contacts.c */
 void free_topology(struct facet_topology *topology);
+/* Words of a topology (collide/contact/contact_facets.py); corners have the numbers of vertices, some of which no facet may have. */
+enum { T_CORNERS_AT, T_PLACES_AT, T_FANS_AT, T_FAN_STARTS_AT, T_EDGES_AT, T_N_CORNERS, T_IS_CONVEX, TOPOLOGY };
+/* Which facets share corners and edges, made by the thread that asks first. */
+collide_status topology_of(const struct collide_kernels *kernels, const collide_mesh *mesh, const int64_t **words);
+/* How far a body reaches from its origin, rounded upwards: contacts near the margin are left to Python, by this. */
+double reach_from_origin(const collide_mesh *mesh);
 
 /* capi_mesh_pairs.c: what the kernels of two meshes read first, with the pair taken, and why a kernel left it to Python. */
 enum { MESH_HEADER = 24, IS_EXCHANGED = 12 };

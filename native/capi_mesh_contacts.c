@@ -11,10 +11,8 @@ enum {
     C_KERNEL, C_N_ROWS, C_REACH_OF_BOTH, C_MESHES = 5, C_TOPOLOGY_A = C_MESHES + MESH_HEADER, C_TOPOLOGY_B, C_LIMIT, C_NEAR_CODE, C_WORDS_AT,
     C_CAPACITY, C_IS_LARGEST, FACETS_HEADER = C_IS_LARGEST + 4
 };
-/* A topology (collide/contact/contact_facets.py). */
-enum { T_CORNERS_AT, T_PLACES_AT, T_FANS_AT, T_FAN_STARTS_AT, T_EDGES_AT, T_N_CORNERS, T_IS_CONVEX, TOPOLOGY };
 /* What `write_contact_constants` writes (collide/contact/contact_constants.py). */
-enum { C_HEADER, C_TOPOLOGY, C_PAIRS, C_ROWS, C_WORDS, C_COMPOUND_HEADER, CONTACT_MEASURES };
+enum { C_HEADER, C_TOPOLOGY, C_PAIRS, C_ROWS, C_WORDS, CONTACT_MEASURES = C_WORDS + 6 };
 
 struct facet_topology {
     int64_t words[TOPOLOGY];
@@ -34,8 +32,7 @@ void free_topology(struct facet_topology *topology)
     free(topology);
 }
 
-/* Which facets share corners and edges, made by the thread that asks first. */
-static collide_status topology_of(const struct collide_kernels *kernels, const collide_mesh *mesh, const int64_t **words)
+collide_status topology_of(const struct collide_kernels *kernels, const collide_mesh *mesh, const int64_t **words)
 {
     collide_mesh *kept = (collide_mesh *)mesh; /* what is made is no part of what the mesh is */
     int64_t m = mesh->tree[N_FACETS], n_corners = 0, k, *memory;
@@ -95,8 +92,7 @@ static struct mesh_contact_space *contact_space_of(collide_workspace *space)
     return space->mesh_contacts = made;
 }
 
-/* How far a body reaches from its origin, rounded upwards: contacts near the margin are left to Python, by this. */
-static double reach_from_origin(const collide_mesh *mesh)
+double reach_from_origin(const collide_mesh *mesh)
 {
     const double *centre = mesh->numbers + CENTRE;
     return (fabs(centre[0]) + fabs(centre[1]) + fabs(centre[2]) + mesh->reach + mesh->radius) * (1 + 1e-12);

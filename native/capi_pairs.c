@@ -1,6 +1,7 @@
 /* Workspaces and queries: as `run_poses` of collide/narrowphase/convex_kernel_calls.py and `distance` of collide/pairs/query.py. */
 #include "capi_compound.h"
 #include "capi_contacts.h"
+#include "capi_mesh.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -103,6 +104,7 @@ void collide_workspace_free(collide_workspace *workspace)
     free(workspace->manifold);
     free(workspace->impact);
     free(workspace->mesh_contacts);
+    free_curved_contacts(workspace->curved_contacts);
     collide_mesh_free(workspace->middle);
     free_compound_space(workspace->compound);
     free_compound_contacts(workspace->compound_contacts);

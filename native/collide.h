@@ -441,6 +441,14 @@ COLLIDE_API collide_status collide_mesh_contacts(collide_workspace *workspace, c
                                                  const double X_WA[16], const double X_WB[16], double margin, size_t max_contacts,
                                                  unsigned flags, collide_contact *contacts, size_t capacity, size_t *count);
 
+/* The same of a mesh, as made by collide_mesh_create, and a convex shape; the mesh stands first. COLLIDE_UNSUPPORTED, never a guess:
+   half-spaces, h-polytopes, what collide_mesh_contacts leaves to Python, and of curved shapes more than 448 facets near them, shapes
+   inside a solid, and overlaps that a shorter way than the facets' might part. */
+COLLIDE_API collide_status collide_mesh_shape_contacts(collide_workspace *workspace, const collide_mesh *mesh,
+                                                       const collide_shape *shape, const double X_WM[16], const double X_WS[16],
+                                                       double margin, size_t max_contacts, unsigned flags,
+                                                       collide_contact *contacts, size_t capacity, size_t *count);
+
 /* --- rays ------------------------------------------------------------------------------------------------------------
 
    Where rays first meet the surface of a shape. Surfaces are closed: a ray through an edge meets the facets around it, a ray from the

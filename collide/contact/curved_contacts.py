@@ -64,7 +64,7 @@ _FIRST_ROWS, _ROWS_PER_POSE = 64, 8
 _LEEWAY = 2.0**-36
 #: Facets whose boxes are near the shape, fewer than MAX_ASKED, and rows, that a single call has space for: more are
 #: left to the long way.
-_FACETS_OF_SINGLE_CALLS, _ROWS_OF_SINGLE_CALLS = 448, 1024
+FACETS_OF_SINGLE_CALLS, ROWS_OF_SINGLE_CALLS = 448, 1024
 #: Lengths tried where slabs prove one longer than the depth, in depths.
 _LENGTHS = (1.0 + 2.0**-20, 1.0 + 2.0**-7, 1.25, 2.0, 4.0)
 #: Facets asked first whether a set moved clears them.
@@ -327,12 +327,12 @@ def single_curved_contacts(A: Shape, B: Shape) -> tuple[Single, Any] | None:
     marks = _marks(1 << max(_sizes_of(body)).bit_length())
     header = np.zeros(CURVED_HEADER, dtype=np.int64)
     header[:STARTS] = (
-        code_of(curved_manifolds), len(space.out), 0, address_of(question.header), body.solid, _FACETS_OF_SINGLE_CALLS,
+        code_of(curved_manifolds), len(space.out), 0, address_of(question.header), body.solid, FACETS_OF_SINGLE_CALLS,
         *(address_of(of) for of in (space.listed, space.places, space.order, space.facets, space.rows)),
     )
     header.view(np.float64)[REACH_OF_BOTH] = compound_parts(A).reach + compound_parts(B).reach
     buffers = (address_of(of) for of in (space.facets, space.rows, header[STARTS:], space.patches, *marks, space.work))
-    header[MANIFOLDS:] = _header_of(body, table, tuple(buffers), _FACETS_OF_SINGLE_CALLS, 1)
+    header[MANIFOLDS:] = _header_of(body, table, tuple(buffers), FACETS_OF_SINGLE_CALLS, 1)
     asked = prepared_contacts(contacts_single_curved, header, space.out)
     return asked, (body, enclosure, block, table, question, space, marks)
 
@@ -341,11 +341,11 @@ class _SpaceOfSingleCalls:
     """What single calls work in: rows and numbers of facets as the walk lists them, and in order; contacts."""
 
     def __init__(self, largest: int):
-        n = _FACETS_OF_SINGLE_CALLS
+        n = FACETS_OF_SINGLE_CALLS
         self.listed, self.rows = np.zeros((2, n), dtype=PAIR_DTYPE)
         self.places, self.order, self.facets, self.patches = np.zeros((4, n), dtype=np.int64)
         self.work = np.empty(workspace_words(n, largest))
-        self.out = np.zeros(_ROWS_OF_SINGLE_CALLS, dtype=CONTACT_DTYPE)
+        self.out = np.zeros(ROWS_OF_SINGLE_CALLS, dtype=CONTACT_DTYPE)
 
 
 #: One for all pairs whose shape has faces of so many corners: the kernels keep Python's lock.

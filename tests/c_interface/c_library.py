@@ -141,6 +141,10 @@ _TYPES = {
     ],
     "collide_mesh_shape_collide": [c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_uint, POINTER(c_int)],
     "collide_mesh_shape_distance": [c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_uint, c_void_p],
+    "collide_mesh_shape_contacts": [
+        c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_size_t, c_uint, c_void_p, c_size_t,
+        POINTER(c_size_t),
+    ],
     "collide_mesh_contacts": [
         c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_size_t, c_uint, c_void_p, c_size_t,
         POINTER(c_size_t),
@@ -523,10 +527,11 @@ class Asker:
         return status, out.astype(bool) if boolean else out, failed.value
 
     def many_contacts(self, A, B, X_WA, X_WB, margin: float, max_contacts: int, *, capacity=1024, flags: int = 0):
-        """(status, rows that there is room for, how many there are) of two `CMesh` or `CCompound`."""
+        """(status, rows that there is room for, how many there are): meshes, unions, a mesh and a shape."""
         rows, count = np.full(max(capacity, 1), 7, dtype=CONTACT_DTYPE), c_size_t()
         X_WA, X_WB = _doubles(X_WA), _doubles(X_WB)
-        name = "collide_mesh_contacts" if isinstance(A, CMesh) else "collide_compound_contacts"
+        name = "collide_mesh_contacts" if isinstance(B, CMesh) else "collide_compound_contacts"
+        name = "collide_mesh_shape_contacts" if isinstance(B, CShape) else name
         status = getattr(library(), name)(
             self.handle, A.handle, B.handle, X_WA.ctypes.data, X_WB.ctypes.data, margin, max_contacts, flags,
             rows.ctypes.data, capacity, count,
