@@ -446,11 +446,15 @@ static collide_status contacts_of_key(const collide_world *world, collide_worksp
     struct world_space *own = space->world;
     int64_t a = first_of(key), b = second_of(key);
     for (;;) {
-        collide_status status = contacts_of_shapes(space, shape_of_body(world, a), shape_of_body(world, b), world->X_WBs + 16 * a,
-                                                   world->X_WBs + 16 * b, margin, max_contacts, COLLIDE_TRUST_POSES, own->contacts,
-                                                   own->n_contacts, n);
         size_t capacity = 2 * own->n_contacts + 64;
         collide_contact *memory;
+        collide_status status;
+        if (is_whole_key(world, key))
+            status = contacts_of_whole(world, space, key, margin, max_contacts, own->contacts, own->n_contacts, n);
+        else
+            status = contacts_of_shapes(space, shape_of_body(world, a), shape_of_body(world, b), world->X_WBs + 16 * a,
+                                        world->X_WBs + 16 * b, margin, max_contacts, COLLIDE_TRUST_POSES, own->contacts,
+                                        own->n_contacts, n);
         if (status != COLLIDE_TOO_MANY) return status;
         if ((memory = realloc(own->contacts, capacity * sizeof *memory)) == NULL) return COLLIDE_NO_MEMORY;
         own->contacts = memory;
@@ -473,9 +477,7 @@ collide_status collide_world_contacts(const collide_world *world, collide_worksp
     given = round_as_kernels_do();
     if (!near_pairs(world, own, margin, &n)) status = no_memory(workspace);
     for (k = 0; k < n && status == COLLIDE_OK; k++) {
-        status = is_whole_key(world, own->keys[k])
-                     ? COLLIDE_UNSUPPORTED
-                     : contacts_of_key(world, workspace, own->keys[k], margin, max_contacts, &some);
+        status = contacts_of_key(world, workspace, own->keys[k], margin, max_contacts, &some);
         if (status != COLLIDE_OK) refuse_pair(world, workspace, own->keys[k], status);
         for (j = 0; j < some && status == COLLIDE_OK; j++, ++*count) {
             own->contacts[j].a = world->ids[first_of(own->keys[k])];

@@ -44,6 +44,15 @@ static int field_of(const struct whole_pair *pair)
     return pair->wholes[1]->field != NULL && pair->shapes[0] != NULL ? 1 : -1;
 }
 
+/* Which body of a mesh of facets and a convex shape is the mesh; -1 of other pairs. */
+static int mesh_of(const struct whole_pair *pair)
+{
+    int k;
+    for (k = 0; k < 2; k++)
+        if (pair->wholes[k]->mesh != NULL && pair->wholes[k]->mesh->given && pair->shapes[!k] != NULL) return k;
+    return -1;
+}
+
 /* Both bodies as facets. */
 static collide_status meshes_of(const struct whole_pair *pair, const collide_mesh *meshes[2])
 {
@@ -63,10 +72,13 @@ collide_status whole_meets(const collide_world *world, collide_workspace *space,
     struct whole_pair pair = pair_of_key(world, key);
     const collide_mesh *meshes[2];
     collide_status status;
-    int f = field_of(&pair), found = 0;
+    int f = field_of(&pair), m = mesh_of(&pair), found = 0;
     if (f >= 0)
         status = collide_field_collide(space, pair.wholes[f]->field, pair.shapes[!f], pair.X[f], pair.X[!f], COLLIDE_TRUST_POSES,
                                        &found);
+    else if (m >= 0)
+        status = collide_mesh_shape_collide(space, pair.wholes[m]->mesh, pair.shapes[!m], pair.X[m], pair.X[!m],
+                                            COLLIDE_TRUST_POSES, &found);
     else if ((status = meshes_of(&pair, meshes)) == COLLIDE_OK)
         status = collide_mesh_collide(space, meshes[0], meshes[1], pair.X[0], pair.X[1], COLLIDE_TRUST_POSES, &found);
     *hit = (uint8_t)found;
@@ -93,14 +105,29 @@ collide_status row_of_whole(const collide_world *world, collide_workspace *space
     struct whole_pair pair = pair_of_key(world, key);
     const collide_mesh *meshes[2];
     collide_status status;
-    int f = field_of(&pair);
-    if (f >= 0) {
+    int f = field_of(&pair), m = mesh_of(&pair);
+    if (f >= 0)
         status = collide_field_distance(space, pair.wholes[f]->field, pair.shapes[!f], pair.X[f], pair.X[!f], limit,
                                         COLLIDE_TRUST_POSES, row);
-        if (f == 1) *row = flipped(row);
-    } else if ((status = meshes_of(&pair, meshes)) == COLLIDE_OK)
+    else if (m >= 0)
+        status = collide_mesh_shape_distance(space, pair.wholes[m]->mesh, pair.shapes[!m], pair.X[m], pair.X[!m],
+                                             COLLIDE_TRUST_POSES, row);
+    else if ((status = meshes_of(&pair, meshes)) == COLLIDE_OK)
         status = collide_mesh_distance(space, meshes[0], meshes[1], pair.X[0], pair.X[1], COLLIDE_TRUST_POSES, row);
+    if (f == 1 || m == 1) *row = flipped(row);
     row->a = world->ids[first_of(key)];
     row->b = world->ids[second_of(key)];
     return status == COLLIDE_OK ? status : refuse_pair(world, space, key, status);
+}
+
+collide_status contacts_of_whole(const collide_world *world, collide_workspace *space, int64_t key, double margin,
+                                 size_t max_contacts, collide_contact *rows, size_t capacity, size_t *n)
+{
+    struct whole_pair pair = pair_of_key(world, key);
+    const collide_mesh *meshes[2];
+    collide_status status = meshes_of(&pair, meshes);
+    *n = 0;
+    if (status != COLLIDE_OK) return status;
+    return collide_mesh_contacts(space, meshes[0], meshes[1], pair.X[0], pair.X[1], margin, max_contacts, COLLIDE_TRUST_POSES, rows,
+                                 capacity, n);
 }

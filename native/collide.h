@@ -554,10 +554,10 @@ COLLIDE_API collide_status collide_point_cloud_within(const collide_field *cloud
 
    Many bodies, a tree over their boxes, and questions about all of them: the answers of Python's World, row by row and bit by
    bit. Bodies are convex shapes; meshes and fields as well, of which a world says what the pair queries above say: whether they
-   hit, and gaps. What these do not answer is COLLIDE_UNSUPPORTED, and the message names the bodies. A change takes its time in
-   the call that makes it: a step moves bodies, and the tree follows. Questions change nothing: any number of threads may ask a
-   world at once, each with its own workspace, while nobody changes it. Shapes, meshes and fields are not copied: free them once
-   no body is made of them.
+   hit, gaps, and contacts of meshes. What these do not answer is COLLIDE_UNSUPPORTED, and the message names the bodies. A change
+   takes its time in the call that makes it: a step moves bodies, and the tree follows. Questions change nothing: any number of
+   threads may ask a world at once, each with its own workspace, while nobody changes it. Shapes, meshes and fields are not
+   copied: free them once no body is made of them.
 
    A pair of bodies is tested unless both are static or asleep, their groups and masks exclude each other (tested when
    (group_A & mask_B) and (group_B & mask_A)), or `collide_world_allow` names the pair.
