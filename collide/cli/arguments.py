@@ -16,6 +16,7 @@ from collide.cli import bench as cli_bench
 from collide.cli import compare as cli_compare
 from collide.cli import config_command as cli_config
 from collide.cli import engines as cli_engines
+from collide.cli import export_command as cli_export
 from collide.cli import fuzz as cli_fuzz
 from collide.cli import locality_command as cli_locality
 from collide.cli import numbers as cli_numbers
@@ -178,6 +179,8 @@ def parser() -> argparse.ArgumentParser:
     cli_spheres.add_arguments(spheres)
     sweep = _add(commands, "sweep", "millions of configurations, to files", cli_sweep.EPILOG)
     cli_sweep.add_arguments(sweep, _scene_arguments)
+    export = _add(commands, "export", "a robot in its scene, for programs in C", cli_export.EPILOG)
+    cli_export.add_arguments(export, _scene_arguments, _length)
     config = _add(commands, "config", "how programs in C and C++ find the library", cli_config.EPILOG)
     cli_config.add_arguments(config)
     _add(commands, "doctor", "is this installation sound?", _DOCTOR)

@@ -21,6 +21,7 @@ from collide.cli import arguments
 from collide.cli import bench as cli_bench
 from collide.cli import compare as cli_compare
 from collide.cli import config_command as cli_config
+from collide.cli import export_command as cli_export
 from collide.cli import fuzz as cli_fuzz
 from collide.cli import locality_command as cli_locality
 from collide.cli import pages as cli_pages
@@ -306,6 +307,7 @@ _COMMANDS: dict[str, Callable] = {
     "report": _report, "check": _check, "stress": _stress,
     "locality": lambda args: cli_locality.run(args, _progress(args.quiet)),
     "scenes": _scenes, "doctor": _doctor, "config": cli_config.run,
+    "export": lambda args: cli_export.run(args, _progress(args.quiet)),
     "bench": lambda args: cli_bench.run(args, _progress(getattr(args, "quiet", True))),
     "compare": lambda args: FREE if cli_compare.run(args, _progress(args.quiet)) else YES,
     "fuzz": lambda args: FREE if cli_fuzz.run(args, _progress(args.quiet)) else YES,

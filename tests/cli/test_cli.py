@@ -230,7 +230,7 @@ def test_no_command_shows_help(capsys):
     assert "examples:" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("command", ["report", "check", "compare", "locality", "scenes", "doctor", "config"])
+@pytest.mark.parametrize("command", ["report", "check", "compare", "locality", "scenes", "doctor", "config", "export"])
 def test_every_command_teaches_itself(capsys, monkeypatch, command):
     monkeypatch.setenv("COLUMNS", "80")
     assert cli.main([command, "--help"]) == 0
@@ -339,3 +339,33 @@ def validate(data):
 
     schema = json.loads(resources.files("collide.reports").joinpath("schema.json").read_text(encoding="utf-8"))
     jsonschema.Draft202012Validator(schema).validate(data)
+
+
+# --- export -------------------------------------------------------------------------------------
+
+
+def test_a_robot_of_a_scene_is_exported(tmp_path, capsys):
+    """The file is that of a checker of the same scene."""
+    need_shipped("workcell")
+    place = tmp_path / "arm.collide"
+    assert cli.main(["export", "workcell", "--meshes", "hull", "--padding", "5mm", "--out", str(place)]) == 0
+    said = capsys.readouterr().out
+    checker = collide.RobotChecker.from_scene(collide.scenes.load("workcell", meshes="hull"), padding=0.005)
+    assert f"{len(checker.bodies)} bodies among {len(checker.around)}, {checker.n_pairs} pairs tested" in said
+    checker.save(tmp_path / "again.collide")
+    assert place.read_bytes() == (tmp_path / "again.collide").read_bytes()
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        (["{}/part.stl", "--out", "{}/a.collide"], "no robot to export"),
+        (["workcell", "--out", "{}/a.txt"], "must end in .collide"),
+        (["workcell"], "--out"),
+        (["workcell", "--name", "nobody", "--out", "{}/a.collide"], "nobody"),
+    ],
+)
+def test_what_cannot_be_exported_is_said(tmp_path, capsys, arguments, words):
+    collide.Mesh(np.eye(4, 3), [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]).save(tmp_path / "part.stl")
+    assert cli.main(["export", *(word.format(tmp_path) for word in arguments)]) == 2
+    assert words in capsys.readouterr().err and [file.name for file in tmp_path.iterdir()] == ["part.stl"]
