@@ -128,11 +128,11 @@ def _clear_crossings(facets: PlacedFacets, points: CutPoints, pairs: np.ndarray)
 def _of_three_bodies(facets: PlacedFacets, pairs: np.ndarray) -> np.ndarray:
     """(k,) rows of facets that meet facets of two other bodies or more."""
     rows, met = pairs.ravel(), facets.body[pairs[:, ::-1].ravel()]
-    least = np.full(len(facets.corners), len(facets.operands))
-    most = np.full(len(facets.corners), -1)
-    np.minimum.at(least, rows, met)
-    np.maximum.at(most, rows, met)
-    return np.flatnonzero(least < most)
+    lowest = np.full(len(facets.corners), len(facets.operands))
+    highest = np.full(len(facets.corners), -1)
+    np.minimum.at(lowest, rows, met)
+    np.maximum.at(highest, rows, met)
+    return np.flatnonzero(lowest < highest)
 
 
 def _all_sheets(
