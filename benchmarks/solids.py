@@ -4,7 +4,8 @@
 
 Two bumpy spheres of as many facets stand in each other. Both engines get meshes that are made, and what they keep with
 them. Times are of the processor, of all threads, and in the table "clock" of the clock: manifold3d has threads, ours is
-one; ms. How often manifold3d's volumes are off is counted by `tests/differential/test_solids.py`.
+one; ms. `--table small` unites two boxes flush in a turned frame, and eight bumpy spheres. How often manifold3d's
+volumes are off is counted by `tests/differential/test_solids.py`.
 """
 
 from __future__ import annotations
@@ -53,12 +54,42 @@ def measure(options: Options, facets: int, op: str) -> Race:
     return Race(tasks, columns=columns, beside=beside)
 
 
+def measure_small(options: Options, union: str) -> Race:
+    """Of few facets, or of many bodies."""
+    X = collide.pose((0, 0, 0), rpy=(0.3, 0.4, 0.5))
+    if union == "two flush boxes":
+        Y = X.copy()
+        Y[:3, 3] = X[:3, :3] @ (1.0, 0.5, 0.0)
+        shapes, poses = [collide.Box((1, 1, 1))] * 2, [X, Y]
+        part = collide.tessellate(shapes[0], tolerance=1.0)[:2]
+        tasks = {"collide": lambda: collide.boolean(*shapes, *poses, "union")}
+    else:
+        rng, part = np.random.default_rng(0), bumpy_sphere(992)
+        shapes = [collide.Mesh(*part, solid=True)] * 8
+        poses = [collide.pose(rng.uniform(-0.8, 0.8, 3), rpy=rng.uniform(-3, 3, 3)) for _ in shapes]
+        tasks = {"collide": lambda: collide.combine(shapes, poses, "union")}
+    made = tasks["collide"]()
+    beside = {"collide": {"facets_made": len(made.mesh.faces)}}
+    if installed(manifold3d="manifold3d"):
+        from manifold3d import Manifold, OpType
+
+        bodies = [manifold_of(part[0] @ X_WS[:3, :3].T + X_WS[:3, 3], part[1]) for X_WS in poses]
+        tasks["manifold3d"] = lambda: Manifold.batch_boolean(bodies, OpType.Add).volume()
+        beside["manifold3d"] = {"facets_made": Manifold.batch_boolean(bodies, OpType.Add).num_tri()}
+    return Race(tasks, columns={"crossings": len(made.self_collisions), "cut": made.n_cut}, beside=beside)
+
+
+def small_cases(options: Options):
+    return grid(union=("two flush boxes", "eight spheres"))
+
+
 def cases(options: Options):
     return grid(facets=(1000, 10_000, 100_000)[: 1 if options.quick else 3], op=OPERATIONS)
 
 
 CLAIMS = [
     Claim("solids", "ms of the processor a boolean", cases, measure, unit="ms", turns=5),
+    Claim("small", "ms of the processor a union", small_cases, measure_small, unit="ms", turns=5),
     Claim("clock", "ms by the clock", cases, measure, unit="ms", turns=5, clock=time.perf_counter, file="solids-clock"),
 ]
 

@@ -21,6 +21,7 @@ from collide.solids.rounded_points import rounded_points, rounded_vertices
 
 #: The reach of the first round, in units in the last place of the largest coordinate.
 REACH = 4.0
+#: Rounds; in the second half all vertices may go, before that vertices of facets that were cut or cross.
 _ROUNDS = 8
 
 
@@ -48,9 +49,12 @@ def clean_mesh(arrangement: Arrangement, triangles: np.ndarray, rows: np.ndarray
         reach = REACH * 2.0 ** max(attempt - 1, 0) * unit
         made = _merged(vertices, faces[proper], proper, sources, movable, reach, attempt > 0)
         mesh, remaining, n_thin = solid_of_facets(made.vertices, made.corners)
-        if mesh is None or not len(crossings_of(mesh)):
+        crossing = crossings_of(mesh) if mesh is not None else np.zeros((0, 2), dtype=np.int64)
+        if not len(crossing):
             break
-        movable[:] = True
+        corners = made.corners[remaining[crossing]]
+        movable[corners[corners < len(movable)]] = True
+        movable |= attempt >= _ROUNDS // 2
     return RoundedMesh(mesh, made.sources[remaining], off + made.moved, len(triangles) - len(remaining), n_thin)
 
 
