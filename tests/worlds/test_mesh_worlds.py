@@ -103,7 +103,8 @@ def test_queries_from_outside():
 def test_an_open_sign_is_counted_as_such():
     world = collide.World()
     world.add(collide.Mesh(*box()), name="box")
-    world.add(collide.Sphere(0.25), pose(t=(0.1, 0.2, 1.25)), name="ball")
+    ball = collide.Compound([(collide.Sphere(0.25), np.eye(4)), (collide.Sphere(0.1), np.eye(4))])
+    world.add(ball, pose(t=(0.1, 0.2, 1.25)), name="ball")
     world.add(collide.Cylinder(0.25, 0.5), pose(t=(-0.5, -0.5, 1.25)), name="can")
     assert world.collides() and len(world.collisions()) == 2
     assert world.stats["undecided"] == 1 and world.stats["mesh_pairs"] == 2
