@@ -221,9 +221,11 @@ class PairResult(Generic[Form]):
     if not TYPE_CHECKING:  # checkers are to know the fields above, and no others
 
         def __getattr__(self, name: str):
-            if name in PairResult.__slots__ and self._single is not None:
-                self._open(*self._single)
-                return getattr(self, name)
+            if name in PairResult.__slots__:
+                single = self._single
+                if single is not None:
+                    self._open(*single)
+                return object.__getattribute__(self, name)  # another thread may have opened it meanwhile
             raise AttributeError(f"no field {name!r}; there are {', '.join(FIELDS)}")
 
         def _open(self, A, B, memory: bytearray, certify: Callable) -> None:
@@ -265,12 +267,13 @@ def _field(name: str) -> property:
     dtype, length, begin = _VECTORS.get(name, (np.dtype("f8"), 0, 0))
 
     def field(self: PairResult) -> Any:
-        if self._single is None:
+        single = self._single  # read once: another thread may open it meanwhile
+        if single is None:
             value = only_value(self.rows[name]) if self.is_single else self.rows[name]
         elif unpack is None:
-            return np.frombuffer(self._single[2], dtype, length, begin).copy()
+            return np.frombuffer(single[2], dtype, length, begin).copy()
         else:
-            (value,) = unpack(self._single[2], at)
+            (value,) = unpack(single[2], at)
         return How(value) if name == "how" and value.__class__ is int else value  # type: ignore[call-arg]
 
     return property(field, doc=f"``{name}``, as in the table of `collide.results`.")

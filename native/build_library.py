@@ -223,6 +223,18 @@ class BuildLibrary(build_ext):
         self.spawn([*self._c_command, "-o", str(out), *objects, *kind])
 
 
+    def _python_library(self, objects: list[str]) -> str:
+        """An import library of python3.dll, the stable interface of Windows: of the functions that objects call."""
+        folder = BUILD / "python3"
+        folder.mkdir(parents=True, exist_ok=True)
+        names = sorted({name for file in objects for name in platforms.imported_names(Path(file)) if "Py" in name})
+        lines = ["LIBRARY python3.dll", "EXPORTS", *names]
+        (folder / "python3.def").write_text("\n".join(lines) + "\n", encoding="utf-8")
+        zig, made = [sys.executable, "-m", "ziglang"], folder / "python3.lib"
+        self.spawn([*zig, "dlltool", "-m", "i386:x86-64", "-d", str(folder / "python3.def"), "-l", str(made)])
+        return str(made)
+
+
 def _compiled_kernels(triple: str) -> dict:
     """As they came with the source archive, or as `compile_kernels.compile_kernels` makes them, in a process of its
     own: it imports the package."""

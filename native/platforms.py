@@ -2,6 +2,7 @@
 
     COLLIDE_PLATFORM=linux-aarch64 pip wheel .    # a wheel for a platform of `PLATFORMS`, on whatever machine
     COLLIDE_INCLUDE=folder:folder                 # headers of that platform's Python and numpy, where they differ
+    COLLIDE_INTERFACE=abi3t                       # for Pythons without the lock, by headers of 3.15 and numpy 2.5
 
 The package ziglang carries clang, linkers, and the C libraries of all platforms: it also compiles for this machine
 where there is no C compiler.
@@ -11,6 +12,7 @@ from __future__ import annotations
 
 import os
 import platform
+import struct
 import sys
 import sysconfig
 import tempfile
@@ -58,10 +60,12 @@ class Platform(NamedTuple):
 
     def options(self) -> dict:
         """Those of setuptools' commands."""
-        wheel = {"py_limited_api": interface().wheel}
-        if not _is_named():
-            return {"bdist_wheel": wheel}
-        return {"bdist_wheel": {**wheel, "plat_name": self.tag}, "build": {"build_base": f"build/{self.name}"}}
+        options: dict = {"bdist_wheel": {"py_limited_api": interface().wheel}}
+        if _is_named():
+            options["bdist_wheel"]["plat_name"] = self.tag
+        if _is_named() or os.environ.get("COLLIDE_INTERFACE"):  # wheels take in all that lies in their folder
+            options["build"] = {"build_base": f"build/{self.name}{interface().suffix}"}
+        return options
 
 
 class Interface(NamedTuple):
@@ -77,11 +81,11 @@ class Interface(NamedTuple):
 
 def interface() -> Interface:
     """That of this Python: without the lock a stable one from 3.15 on, which builds with the lock load, too."""
-    windows = chosen().system == "win32"
-    if not sysconfig.get_config_var("Py_GIL_DISABLED"):
-        return Interface("Py_LIMITED_API=0x030A0000", ".pyd" if windows else ".abi3.so", "cp310")
-    if sys.version_info >= (3, 15):
+    windows, free = chosen().system == "win32", bool(sysconfig.get_config_var("Py_GIL_DISABLED"))
+    if os.environ.get("COLLIDE_INTERFACE") == "abi3t" or (free and sys.version_info >= (3, 15)):
         return Interface("Py_TARGET_ABI3T=0x030F0000", ".pyd" if windows else ".abi3t.so", "cp315")
+    if not free:
+        return Interface("Py_LIMITED_API=0x030A0000", ".pyd" if windows else ".abi3.so", "cp310")
     if _is_named():
         raise SystemExit(
             "collide: COLLIDE_PLATFORM: without the lock this Python has no stable interface; "
@@ -116,6 +120,21 @@ def chosen() -> Platform:
     if name not in PLATFORMS and name != _own_name():
         raise SystemExit(f"COLLIDE_PLATFORM: {name!r} is no platform; it may be {', '.join(PLATFORMS)}")
     return PLATFORMS.get(name, Platform(name, "", "", ""))
+
+
+def imported_names(file: Path) -> set[str]:
+    """Names that an object file of Windows, in the COFF format, takes from libraries."""
+    data = file.read_bytes()
+    at, n = struct.unpack_from("<II", data, 8)  # the table of symbols, 18 bytes each; long names follow it
+    names, k = set(), 0
+    while k < n:
+        short, section, n_more = struct.unpack_from("<8s4xh3xB", data, at + 18 * k)
+        if section == 0:
+            begin = at + 18 * n + int.from_bytes(short[4:], "little")
+            name = short if short[:4] != bytes(4) else data[begin : data.index(0, begin)]
+            names.add(name.rstrip(b"\0").decode())
+        k += 1 + n_more
+    return {name.removeprefix("__imp_") for name in names if name.startswith("__imp_")}
 
 
 def needs_zig(wanted: Platform) -> bool:

@@ -1,13 +1,18 @@
-/* collide.kernels._glue: the kernels of libcollide as Python functions, of CPython's limited interface.
+/* collide.kernels._glue: the kernels of libcollide as Python functions. The build says of which interface of CPython's
+   (native/platforms.py): the limited one of 3.10; of builds without the lock the one of 3.15 that all builds load
+   (abi3t), or, before, that of the very version.
 
    The library is opened by its path, after Python has looked at its size and checksum. Numpy's arrays are read through
    numpy's own C interface. */
-#define Py_LIMITED_API 0x030A0000
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
 
 #define NPY_NO_DEPRECATED_API NPY_1_7_API_VERSION
+#if defined(Py_TARGET_ABI3T)
+#define NPY_TARGET_VERSION NPY_2_5_API_VERSION
+#else
 #define NPY_TARGET_VERSION NPY_1_22_API_VERSION
+#endif
 #include <numpy/arrayobject.h>
 
 #include <stdint.h>
@@ -22,7 +27,10 @@
 #include "kernels.h"
 #include "kernels_of_level.h"
 
+/* Written while `collide` is imported, and read by all threads later. */
 static const struct collide_kernels *kernels = NULL;
+/* Whether threads run Python at once: then each makes its pairs ready for itself (collide/narrowphase/prepared_pairs.py). */
+static int by_thread = 0;
 static const char *const kernel_names[] = {COLLIDE_KERNEL_NAMES};
 
 /* --- arguments ---------------------------------------------------------------------------------------------------- */
@@ -262,22 +270,41 @@ static int attribute_of(PyObject *owner, enum word name, PyObject **found)
     return 0;
 }
 
+#if defined(Py_LIMITED_API) && Py_LIMITED_API + 0 < 0x030D0000
+/* Such builds hold the lock: nobody takes the item away before it is ours. */
+static int PyDict_GetItemRef(PyObject *items, PyObject *key, PyObject **found)
+{
+    if ((*found = PyDict_GetItemWithError(items, key)) == NULL) return PyErr_Occurred() == NULL ? 0 : -1;
+    Py_INCREF(*found);
+    return 1;
+}
+#endif
+
+/* What a pair is kept under: the number of B, and, where threads run at once, of this thread. Takes over the reference. */
+static PyObject *key_of(PyObject *serial)
+{
+    PyObject *thread, *key;
+    if (!by_thread) return serial;
+    thread = PyLong_FromUnsignedLong(PyThread_get_thread_ident());
+    key = thread == NULL ? NULL : PyTuple_Pack(2, serial, thread);
+    Py_XDECREF(thread);
+    Py_DECREF(serial);
+    return key;
+}
+
 /* How the pair made ready of A and B answers a question, as `attribute_of` says; the attribute itself has to be there. */
 static int kept_single_of(PyObject *A, PyObject *B, enum word question, PyObject **single)
 {
-    PyObject *pairs, *serial, *pair;
+    PyObject *pairs, *key, *pair = NULL;
     int found;
     *single = NULL;
     if ((found = attribute_of(A, PREPARED, &pairs)) <= 0) return found;
-    if ((found = attribute_of(B, SERIAL, &serial)) > 0) {
-        pair = PyDict_CheckExact(pairs) ? PyDict_GetItemWithError(pairs, serial) : NULL;
-        Py_DECREF(serial);
-        if (pair == NULL) found = PyErr_Occurred() == NULL ? 0 : -1;
-        else {
-            Py_INCREF(pair);
-            found = (*single = PyObject_GetAttr(pair, words[question])) == NULL ? -1 : 1;
-            Py_DECREF(pair);
-        }
+    if ((found = attribute_of(B, SERIAL, &key)) > 0) {
+        if ((key = key_of(key)) == NULL) found = -1;
+        else found = PyDict_CheckExact(pairs) ? PyDict_GetItemRef(pairs, key, &pair) : 0;
+        Py_XDECREF(key);
+        if (found > 0) found = (*single = PyObject_GetAttr(pair, words[question])) == NULL ? -1 : 1;
+        Py_XDECREF(pair);
     }
     Py_DECREF(pairs);
     return found;
@@ -570,6 +597,7 @@ struct made_method {
     char name[64];
 };
 static struct made_method *made_methods = NULL;
+static PyThread_type_lock made_methods_lock = NULL;
 
 static PyObject *call_self(PyObject *self, PyObject *values, PyObject *keywords) { return PyObject_Call(self, values, keywords); }
 
@@ -584,9 +612,9 @@ static PyObject *builtin_of(PyObject *module, PyObject *arguments)
         PyErr_SetString(PyExc_TypeError, "builtin_of: a name of less than 64 bytes, and what can be called");
         return NULL;
     }
+    PyThread_acquire_lock(made_methods_lock, WAIT_LOCK); /* nobody calls Python, nor waits, who holds it */
     for (made = made_methods; made != NULL && strcmp(made->name, name) != 0; made = made->next) {}
-    if (made == NULL) {
-        if ((made = PyMem_Calloc(1, sizeof *made)) == NULL) return PyErr_NoMemory();
+    if (made == NULL && (made = PyMem_Calloc(1, sizeof *made)) != NULL) {
         strcpy(made->name, name);
         made->method.ml_name = made->name;
         made->method.ml_meth = (PyCFunction)(void (*)(void))call_self;
@@ -594,7 +622,8 @@ static PyObject *builtin_of(PyObject *module, PyObject *arguments)
         made->next = made_methods;
         made_methods = made;
     }
-    return PyCFunction_New(&made->method, function);
+    PyThread_release_lock(made_methods_lock);
+    return made == NULL ? PyErr_NoMemory() : PyCFunction_New(&made->method, function);
 }
 
 /* --- the module ---------------------------------------------------------------------------------------------------- */
@@ -641,7 +670,7 @@ static void *symbol_of(const char *path, const char *name)
     return found;
 }
 
-/* load(path, level): the level chosen. Raises OSError where the library cannot be used, ValueError of a level that is not to be
+/* load(path, level, by_thread): the level chosen. Raises OSError where the library cannot be used, ValueError of a level that is not to be
    had. */
 static PyObject *load(PyObject *module, PyObject *arguments)
 {
@@ -650,7 +679,8 @@ static PyObject *load(PyObject *module, PyObject *arguments)
     const struct collide_kernels *(*of_level)(const char *, const char **, const char **);
     const struct collide_kernels *found;
     void *symbol;
-    if (!PyArg_ParseTuple(arguments, "ss:load", &path, &wanted)) return NULL;
+    int is_by_thread;
+    if (!PyArg_ParseTuple(arguments, "ssp:load", &path, &wanted, &is_by_thread)) return NULL;
     if ((symbol = symbol_of(path, "collide_kernel_table")) == NULL) return NULL;
     memcpy(&table, &symbol, sizeof table);
     if (table() != COLLIDE_TABLE) {
@@ -665,6 +695,7 @@ static PyObject *load(PyObject *module, PyObject *arguments)
         return NULL;
     }
     kernels = found;
+    by_thread = is_by_thread;
     return PyUnicode_FromString(level);
 }
 
@@ -681,10 +712,42 @@ static PyMethodDef methods[] = {
     {NULL, NULL, 0, NULL},
 };
 
+/* 0, or −1 with an exception. */
+static int begin(PyObject *module)
+{
+    import_array1(-1);
+    if (made_methods_lock == NULL && (made_methods_lock = PyThread_allocate_lock()) == NULL) {
+        PyErr_NoMemory();
+        return -1;
+    }
+    return 0;
+}
+
+/* The module needs no lock of Python's: what it has of its own is written while it is imported, or under a lock of its own, and
+   memory that kernels write is the calling thread's. */
+#if defined(Py_TARGET_ABI3T)
+PyABIInfo_VAR(abi_of_build);
+static PySlot slots[] = {
+    PySlot_STATIC_DATA(Py_mod_abi, &abi_of_build),
+    PySlot_STATIC_DATA(Py_mod_name, "_glue"),
+    PySlot_STATIC_DATA(Py_mod_methods, methods),
+    PySlot_FUNC(Py_mod_exec, begin),
+    PySlot_DATA(Py_mod_multiple_interpreters, Py_MOD_MULTIPLE_INTERPRETERS_NOT_SUPPORTED),
+    PySlot_DATA(Py_mod_gil, Py_MOD_GIL_NOT_USED),
+    PySlot_END,
+};
+
+PyMODEXPORT_FUNC PyModExport__glue(void) { return slots; }
+#else
 static struct PyModuleDef definition = {PyModuleDef_HEAD_INIT, "_glue", NULL, -1, methods, NULL, NULL, NULL, NULL};
 
 PyMODINIT_FUNC PyInit__glue(void)
 {
-    import_array();
-    return PyModule_Create(&definition);
+    PyObject *module = PyModule_Create(&definition);
+    if (module != NULL && begin(module) < 0) Py_CLEAR(module);
+#if defined(Py_GIL_DISABLED)
+    if (module != NULL && PyUnstable_Module_SetGIL(module, Py_MOD_GIL_NOT_USED) < 0) Py_CLEAR(module);
+#endif
+    return module;
 }
+#endif

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Everything that takes long, in an hour and a half on two cores: every extra, all cases of all tests, other processors'
-# levels and other Pythons, soaks, a search for wrong answers of engines, faults planted in the code.
+# levels, other Pythons and other machines, soaks, a search for wrong answers of engines, faults planted in the code.
 #
 #   bash tests/nightly.sh                  all steps; logs and a table in build/nightly
 #   bash tests/nightly.sh tests soaks      these steps alone
@@ -11,7 +11,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 unset PYTHONDONTWRITEBYTECODE # where bytecode is kept, collecting the tests takes a third of the time
-steps=(install tests own plain matrix soaks faults site)
+steps=(install tests own plain matrix machines soaks faults site)
 chosen=("${@:-${steps[@]}}")
 log=build/nightly
 mkdir -p "$log"
@@ -19,10 +19,14 @@ mkdir -p "$log"
 seed=$((10#$(date +%y%j)))
 
 run() { # NAME COMMAND...: the command's output goes to a file, how it ended to the table
-    local begun=$SECONDS status=0
+    local begun=$SECONDS status=0 ended
     "${@:2}" > "$log/$1.log" 2>&1 || status=$?
-    printf '%-16s %5d s  %s\n' "$1" $((SECONDS - begun)) "$([ $status = 0 ] && echo passed || echo "failed: $log/$1.log")" |
-        tee -a "$log/steps"
+    case $status in
+        0) ended=passed ;;
+        77) ended=$(tail -n 1 "$log/$1.log") ;; # skipped: and why
+        *) ended="failed: $log/$1.log" ;;
+    esac
+    printf '%-16s %5d s  %s\n' "$1" $((SECONDS - begun)) "$ended" | tee -a "$log/steps"
 }
 tests=(python -m pytest -q -n auto --maxprocesses 4 --dist loadfile -rfE)
 
@@ -44,6 +48,10 @@ own() {
 }
 plain() { NUMBA_DISABLE_JIT=1 run plain python -m pytest -q tests/contact/test_facet_manifolds.py -k no_patch_may_reach; }
 matrix() { run matrix bash tests/matrix.sh; }
+machines() {
+    local script
+    for script in arm64 free_threads; do run "$script" bash "tests/machines/$script.sh"; done
+}
 soaks() {
     rm -rf "$log/fuzz" # of the last night: a search goes on from its folder only where it is told to
     run fuzz collide fuzz --minutes 20 --seed "$seed" --save "$log/fuzz" --quiet & # one core
@@ -53,6 +61,7 @@ soaks() {
     run soak-contacts python tests/soak/soak_contacts.py --pairs 20000 --seed "$seed"
     run soak-motions python tests/soak/soak_motions.py --motions 5000 --seed "$seed"
     run soak-solids python tests/soak/soak_solids.py --chains 80 --seed "$seed"
+    run soak-threads python tests/soak/soak_threads.py --pairs 200 --rounds 3 --seed "$seed"
     wait
 }
 faults() { run faults python tests/mutants/planted_faults.py --faults 200 --seed 1; }

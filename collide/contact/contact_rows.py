@@ -190,9 +190,11 @@ class Contacts:
         def __getattr__(self, name: str):
             if name in FIELDS:
                 return self.rows[name]
-            if name in Contacts.__slots__ and self._single is not None:
-                self.__init__(np.frombuffer(self._single, CONTACT_DTYPE))
-                return getattr(self, name)
+            if name in Contacts.__slots__:
+                single = self._single
+                if single is not None:
+                    self.__init__(np.frombuffer(single, CONTACT_DTYPE))
+                return object.__getattribute__(self, name)  # another thread may have opened it meanwhile
             raise AttributeError(f"no field {name!r}; there are {', '.join(FIELDS)}")
 
     def __dir__(self):

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from collide.base.free_threads import workspace_under_lock
 from collide.base.threads import answers_in_order, pieces_of
 from collide.contact.contact_rows import CONTACT_DTYPE, OVERLAP, Rows, Slack, joined_rows, no_rows
 from collide.contact.curved_contact_call import (
@@ -349,7 +350,7 @@ class _SpaceOfSingleCalls:
 
 
 #: One for all pairs whose shape has faces of so many corners: the kernels keep Python's lock.
-_space_of_single_calls = cache(_SpaceOfSingleCalls)
+_space_of_single_calls = workspace_under_lock(_SpaceOfSingleCalls)
 
 
 @cache

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from functools import cache
 from threading import local
 from typing import Any
 
 import numpy as np
 
+from collide.base.free_threads import workspace_under_lock
 from collide.base.threads import answers_in_order, pieces_of
 from collide.contact.contact_rows import CONTACT_DTYPE, Rows, Slack, joined_rows
 from collide.contact.convex_contacts import convex_contacts
@@ -198,7 +198,7 @@ def single_facet_contacts(A: Shape, B: Shape) -> tuple[Single, Any] | None:
     return prepared_contacts(contacts_single_facets, header, rows), (body_a, body_b, work, words)
 
 
-@cache
+@workspace_under_lock
 def _space_of_single_calls() -> tuple[np.ndarray, np.ndarray]:
     """(workspace, rows), one for all: the kernels keep Python's lock."""
     return np.empty(workspace_words(PAIRS_OF_SINGLE_CALLS)), np.zeros(ROWS_OF_SINGLE_CALLS, dtype=CONTACT_DTYPE)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from functools import cache, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from collide.base.free_threads import workspace_under_lock
 from collide.contact.compound_contact_call import (
     BATCH,
     COMPOSITE,
@@ -182,13 +183,13 @@ def _single_contacts(table: ShapeTable) -> tuple[Single, Any]:
     return prepared_contacts(contacts_single, header, space.rows), (block, faces, space.buffers)
 
 
-@cache
+@workspace_under_lock
 def _space_of_contacts() -> ManifoldSpace:
     """One for all single calls, as `convex_kernel_calls.space_of_single_calls`; faces of boxes fit at once."""
     return ManifoldSpace().fit(ROUND)
 
 
-@cache
+@workspace_under_lock
 def _block_of_unions() -> BlockWorkspace:
     """A workspace for all single calls of unions, which write rows of the table into the block."""
     return BlockWorkspace()

@@ -8,12 +8,14 @@ milliseconds of a start. Where sources were edited, the library serves the entri
 from __future__ import annotations
 
 import os
+import sys
 import zlib
 from collections.abc import Callable
 from contextlib import suppress
 from importlib import import_module
 from typing import Any
 
+from collide.base.free_threads import FREE_THREADED
 from collide.errors import InvalidArgument
 from collide.kernels import sources
 
@@ -43,13 +45,15 @@ def load() -> str:
     built = _built()
     if built is None:
         return _UNBUILT
+    if "free-threading" in sys.version and any(".abi3." in name for name in built.FILES):
+        return "it is for builds of Python with the lock; install collide-robotics again, for this Python"
     edited = _edited(built)
     for name, (size, checksum) in built.FILES.items():
         if why := _why_damaged(_path(name), size, checksum):
             return f"it is damaged, {why}; install collide-robotics again"
     try:
         functions = import_module("collide.kernels._glue")
-        level = functions.load(_path(_library_of(built.FILES)), wanted)
+        level = functions.load(_path(_library_of(built.FILES)), wanted, FREE_THREADED)
     except ValueError as error:  # no such level
         if wanted:
             raise InvalidArgument(

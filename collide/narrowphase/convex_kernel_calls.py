@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cache
 from threading import local
 
 import numpy as np
 
+from collide.base.free_threads import workspace_under_lock
 from collide.errors import UnsupportedQuery
 from collide.kernels import address_of, code_of
 from collide.kernels.prepared import prepared_boolean, prepared_row, prepared_within
@@ -276,9 +276,9 @@ class _OfThread(local):
 _of_thread = _OfThread()
 
 
-@cache
+@workspace_under_lock
 def space_of_single_calls() -> BlockWorkspace:
-    """A workspace for all single calls: their kernels keep Python's lock. Two threads at once may get two workspaces,
+    """A workspace for all single calls of kernels that keep Python's lock. Two threads at once may get two workspaces,
     and either works while held."""
     return BlockWorkspace()
 

@@ -3,6 +3,10 @@
 A pair goes with A, its holder. The pair goes with B by a weak reference, held by A as well: nothing outside of the two
 shapes knows of the pair, and the callback at the end of B refers to A weakly. The trees and tables of a pair must not
 hold the shapes.
+
+Single calls write into workspaces of the pair and of its kernels. Python's lock keeps them for one thread at a time.
+Without the lock a pair is kept under B's number and the thread, and its workspaces are the thread's
+(`base/free_threads.py`): threads share shapes and trees, which do not change.
 """
 
 from __future__ import annotations
@@ -11,8 +15,11 @@ import itertools
 import weakref
 from collections.abc import Callable
 from functools import partial
+from threading import get_ident
 from typing import Any
 
+from collide.base.fork_safe_lock import ForkSafeLock
+from collide.base.free_threads import FREE_THREADED
 from collide.kernels import PLAIN_PYTHON
 from collide.shapes.shape import Shape
 
@@ -22,6 +29,8 @@ Single = Callable[..., Any]
 #: Numbers of shapes within this process, never used again.
 _serials = itertools.count()
 _set, _ref = object.__setattr__, weakref.ref
+#: Held where a shape gets its number or its first partner: threads that ask at once must see the same.
+_beginning = ForkSafeLock()
 #: A shape keeps this many partners.
 _MAX_PARTNERS = 512
 
@@ -76,8 +85,10 @@ _PARTS = [name for name in Prepared.__slots__ if name not in ("__weakref__", "he
 
 def prepared_pair(A: Shape, B: Shape) -> Prepared | None:
     """The pair, or ``None`` where not prepared. `native/python_module.c` reads the same two attributes."""
-    pairs = getattr(A, "_prepared", None)
-    return pairs.get(getattr(B, "_serial", None)) if pairs.__class__ is dict else None  # a class has a descriptor there
+    pairs, key = getattr(A, "_prepared", None), getattr(B, "_serial", None)
+    if FREE_THREADED:
+        key = key, get_ident()
+    return pairs.get(key) if pairs.__class__ is dict else None  # a class has a descriptor there
 
 
 def single_calls_are_safe() -> bool:
@@ -94,28 +105,24 @@ def kept_pair(A: Shape, B: Shape) -> Prepared:
 
 
 def keep_prepared(A: Shape, B: Shape, pair: Prepared) -> None:
-    prepared, partners = getattr(A, "_prepared", None), getattr(A, "_partners", None)
-    if prepared is None:
-        prepared = {}
-        _set(A, "_prepared", prepared)
-    if partners is None:
-        partners = {}
-        _set(A, "_partners", partners)
-    serial = getattr(B, "_serial", None)
-    if serial is None:
-        serial = next(_serials)
-        _set(B, "_serial", serial)
+    with _beginning.now:
+        if getattr(A, "_partners", None) is None:
+            _set(A, "_partners", {})
+            _set(A, "_prepared", {})
+        if getattr(B, "_serial", None) is None:
+            _set(B, "_serial", next(_serials))
+    prepared, partners, key = A._prepared, A._partners, (B._serial, get_ident()) if FREE_THREADED else B._serial
     if len(prepared) >= _MAX_PARTNERS:
         # a list: other threads add, and partners that go take
         for oldest in list(prepared)[: len(prepared) + 1 - _MAX_PARTNERS]:
             _forget(lambda: A, oldest)
-    prepared[serial] = pair
-    partners[serial] = _ref(B, partial(_forget, _ref(A), serial))
+    prepared[key] = pair
+    partners[key] = _ref(B, partial(_forget, _ref(A), key))
 
 
-def _forget(A: Callable[[], Shape | None], serial: int, _: Any = None) -> None:
+def _forget(A: Callable[[], Shape | None], key: Any, _: Any = None) -> None:
     """A partner is gone. Nothing of this module is called: at the end of the process its names are gone before."""
     shape = A()
     if shape is not None:
-        shape._prepared.pop(serial, None)
-        shape._partners.pop(serial, None)
+        shape._prepared.pop(key, None)
+        shape._partners.pop(key, None)

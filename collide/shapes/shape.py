@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from collide.base import argument_checks as checks
+from collide.base.fork_safe_lock import ForkSafeLock
 from collide.errors import InvalidShape, brief
 from collide.transforms import LARGEST, SMALLEST
 
@@ -40,10 +41,10 @@ class Shape:
     _link_spheres: Any
     _sphere_rows: dict[float, tuple]
     #: Pairs made ready for single calls, by the number of the other shape (`query.py`).
-    _prepared: dict[int, Any]
+    _prepared: dict[Any, Any]
     _serial: int
     #: Weak references to those other shapes, by their number (`narrowphase/prepared_pairs.py`).
-    _partners: dict[int, Any]
+    _partners: dict[Any, Any]
     #: For rays that miss by the ball around the body (`composite/balls_on_ways.py`).
     _ray_way: Any
     #: What a union comes down to, and which of that are meshes (`casts/leaves.py`).
@@ -166,6 +167,7 @@ class Shape:
 
 #: Stands for what a shape does not keep: a default costs a fifth of an exception.
 _NOT_MADE: Any = object()
+_keeping = ForkSafeLock()
 
 
 def kept_with_shape(slot: str) -> Callable[[Callable[[Any], T]], Callable[[Any], T]]:
@@ -174,11 +176,15 @@ def kept_with_shape(slot: str) -> Callable[[Callable[[Any], T]], Callable[[Any],
     def decorate(make: Callable[[Any], T]) -> Callable[[Any], T]:
         @wraps(make)
         def of(shape: Any) -> T:
-            made = getattr(shape, slot, _NOT_MADE)
-            if made is _NOT_MADE:
-                made = make(shape)
-                object.__setattr__(shape, slot, made)
-            return made
+            known = getattr(shape, slot, _NOT_MADE)
+            if known is not _NOT_MADE:
+                return known
+            made = make(shape)
+            with _keeping.now:  # of two threads that ask at once both may make one: the first counts
+                known = getattr(shape, slot, _NOT_MADE)
+                if known is _NOT_MADE:
+                    object.__setattr__(shape, slot, made)
+            return made if known is _NOT_MADE else known
 
         return of
 

@@ -52,6 +52,9 @@ class WorldScene:
     def _begin_unread(self) -> None:
         """As if nothing had been asked yet."""
         self._lock, self._n_changes = ForkSafeLock(), 0
+        #: Held by a reader that counts itself and looks at a version, by a change that marks tables STALE and looks for
+        #: readers. Without Python's lock either could see the other's memory from before.
+        self._glance = ForkSafeLock()
         #: Tables of the bodies, made last; those that questions begin with: of before the changes of a `changes` block.
         self._packed: PackedWorld | None = None
         self._published: PackedWorld | None = None
@@ -424,9 +427,10 @@ class WorldScene:
         me, packed = get_ident(), self._published
         self._note_asker()
         while packed is not None:
-            # A reader counts before it looks, and a change marks tables STALE before it counts: one of them gives way.
-            packed.readers.append(None)
-            if packed.version == self._n_changes:
+            with self._glance.now:
+                packed.readers.append(None)
+                is_current = packed.version == self._n_changes
+            if is_current:
                 return packed
             is_in_block = self._is_in_block() and self._changer is not None and self._changer[1] != me
             if is_in_block and packed is self._published:
@@ -471,9 +475,10 @@ class WorldScene:
         """
         may_change = not self._is_in_block() or packed is not self._published
         if may_change:
-            version, packed.version = packed.version, STALE
-            if packed.readers:
-                may_change, packed.version = False, version
+            with self._glance.now:
+                version, packed.version = packed.version, STALE
+                if packed.readers:
+                    may_change, packed.version = False, version
         if not may_change and packed.shares_poses:
             self._bodies.leave_poses()
         packed.shares_poses = False

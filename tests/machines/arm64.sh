@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Linux on arm64, run on another kind of processor: a wheel cross-compiled by the package ziglang, run by qemu-user with
-# Debian's Python for arm64. Programs in C, the C interface, tests of the engine; and all answers of tests/golden.py, bit
-# by bit, against this machine's.
+# Debian's Python for arm64. Programs in C, the C interface, tests of the engine; all answers of tests/golden.py, bit by
+# bit, against this machine's.
 #
 #   bash tests/machines/arm64.sh                          # some ten minutes on one core
 #   bash tests/machines/arm64.sh tests/worlds             # these tests instead
@@ -21,9 +21,7 @@ unpacked bookworm arm64 "$root" \
     python3.11-minimal libpython3.11-minimal libpython3.11-stdlib
 wheel_of linux-aarch64
 rm -rf "$site"
-python -m pip install --quiet --disable-pip-version-check --target "$site" --only-binary :all: --implementation cp \
-    --python-version 3.11 --platform manylinux_2_28_aarch64 --platform manylinux_2_27_aarch64 \
-    --platform manylinux2014_aarch64 pytest hypothesis scipy "$wheel"
+packages_for "$site" aarch64 3.11 "" pytest hypothesis scipy "$wheel"
 
 # Python's processes start others by its own name: a script that has qemu run it.
 arm=(qemu-aarch64 -L "$root")
@@ -43,6 +41,6 @@ examples_of "$work/arm64-examples" aarch64-linux-gnu.2.28 "$site/collide/lib/lib
 examples_agree "$work/arm64-examples" "${arm[@]}" -E LD_LIBRARY_PATH="$site/collide/lib"
 python tests/golden.py --keep "$work/answers"
 arm_python tests/golden.py --against "$work/answers"
-# No compiler on the path: it would make programs of this machine's kind. A forked child of threads does not end in qemu.
+# No compiler on the path: it would make programs of this machine's kind. Forks of threads do not end in qemu.
 mkdir -p "$work/nothing"
 PATH=$work/nothing arm_python -m pytest -q -p no:cacheprovider -k "not a_fork_while" "${chosen[@]}"

@@ -3,7 +3,7 @@
 work=$PWD/build/machines
 mkdir -p "$work"
 
-skip() { echo "skipped: $*"; exit 77; }
+skip() { echo "skipped: $*" >&2; exit 77; }
 need() { command -v "$1" > /dev/null || skip "no $1: apt-get install $2"; }
 
 apt_of() { # SUITE ARCHITECTURE: a folder of its own for apt-get's lists, in APT_CONFIG
@@ -45,6 +45,25 @@ unpacked() { # SUITE ARCHITECTURE FOLDER PACKAGE...: the packages' files
         rm -r "$folder/packages"
     )
     touch "$folder/unpacked"
+}
+
+packages_for() { # FOLDER PLATFORM VERSION ABI PACKAGE...: of PyPI, for a Python in which no pip runs; ABI "" is any
+    local kind=(--platform "$2")
+    [ "$2" = win_amd64 ] || kind=(--platform "manylinux_2_28_$2" --platform "manylinux_2_27_$2" --platform "manylinux2014_$2")
+    python -m pip install --quiet --disable-pip-version-check --target "$1" --only-binary :all: --ignore-requires-python \
+        --implementation cp --python-version "$3" ${4:+--abi "$4"} "${kind[@]}" "${@:5}"
+}
+
+python_source() { # SUITE PACKAGE FOLDER: the sources of a Python, as they are without Debian's changes
+    [ -e "$3/configure" ] && return
+    need dpkg-source dpkg-dev
+    (
+        apt_of "$1" "$(dpkg --print-architecture)"
+        mkdir -p "$work/sources"
+        cd "$work/sources"
+        apt-get -q source --download-only "$2" > log 2>&1 || { cat log; exit 1; }
+        dpkg-source --no-check --skip-patches -x "$2"_*.dsc "$3" > log
+    ) || skip "Debian's archive has no sources of $2"
 }
 
 wheel_of() { # PLATFORM: its wheel, in $wheel; kernels of unchanged sources are there from the last time

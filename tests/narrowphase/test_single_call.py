@@ -13,6 +13,7 @@ import pytest
 from naive import Case, random_pose, rng_of
 
 import collide
+from collide.base.free_threads import FREE_THREADED
 from collide.narrowphase.prepared_pairs import prepared_pair, single_calls_are_safe
 from collide.pairs import query
 
@@ -116,7 +117,8 @@ def test_new_pairs_walk_few_functions():
         A, B = naive.one_of_each(rng)[kind_a], naive.one_of_each(rng)[kind_b]
         collide.collide(*(naive.one_of_each(rng)[kind] for kind in (kind_a, kind_b)), X, Y)  # loads what is lazy
         walked = functions_walked(lambda A=A, B=B: collide.collide(A, B, X, Y))
-        assert prepared_pair(A, B) is not None and len(walked) <= 15 + 6 * (kind_a, kind_b).count("Capsule"), walked
+        limit = 15 + 2 * FREE_THREADED + 6 * (kind_a, kind_b).count("Capsule")  # a workspace of the thread, looked up
+        assert prepared_pair(A, B) is not None and len(walked) <= limit, walked
 
 
 def test_pairs_of_few_numbers_hold_one_block():

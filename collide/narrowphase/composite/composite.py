@@ -9,6 +9,7 @@ from threading import local
 
 import numpy as np
 
+from collide.base.free_threads import workspace_under_lock
 from collide.kernels import address_of, code_of
 from collide.kernels.prepared import prepared_boolean, prepared_row, prepared_within
 from collide.lowering.compound_table import BALL_IN_WORLD, CompoundTable, LaidOut
@@ -129,8 +130,6 @@ def answer_compound_batch(
         )
 
 
-#: Workspace of all single calls: their kernels keep Python's lock. A larger one takes its place; pairs hold their own.
-_single_space: _SingleSpace | None = None
 #: Pairs of parts of a single call, which keeps Python's lock; more are left to the long way, which lets go of it. Of
 #: bodies with more pairs, so many at most are answered before they are left to it.
 _MAX_AT_ONCE, _MAX_OF_MANY = 1024, 256
@@ -140,12 +139,14 @@ _MAX_PARTS = 1 << 13
 
 def single_header(table: CompoundTable) -> tuple[np.ndarray, _SingleSpace]:
     """(header of single calls of bodies 0 and 1, their workspace)."""
-    global _single_space
-    space = _single_space  # read once: another thread may put a smaller one there
-    if space is None or space.capacity < table.max_parts:
-        space = _single_space = _SingleSpace(table.max_parts)
+    space = _single_space(1 << (table.max_parts - 1).bit_length())
     at_once = _MAX_AT_ONCE if table.counts.prod() <= _MAX_AT_ONCE else _MAX_OF_MANY
     return space.header_of(table, space.scratch, at_once), space
+
+
+@workspace_under_lock
+def _single_space(max_parts: int) -> _SingleSpace:
+    return _SingleSpace(max_parts)
 
 
 def prepared_compounds(A: LaidOut, B: LaidOut) -> Prepared:

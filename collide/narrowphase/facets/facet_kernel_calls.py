@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from collide.base.free_threads import workspace_under_lock
 from collide.kernels import address_of, code_of
 from collide.kernels.prepared import prepared_boolean, prepared_row
 from collide.lowering.facet_bodies import Body, hull_of, reach_of
@@ -363,22 +364,19 @@ def _far_gap(A: Body, B: Body, X_WA, X_WB, limit: float) -> np.ndarray:
 # --- single calls -------------------------------------------------------------------------------
 
 
-#: Workspace of all single calls: their kernels keep Python's lock. A larger one takes its place where trees are deeper.
-_single_space: Workspace | None = None
-
-
 def serves_single_calls(A: Body, B: Body) -> bool:
     """Whether single calls are short enough to keep Python's lock."""
     return max(len(A.points) if B.solid else 0, len(B.points) if A.solid else 0) <= _MAX_POINTS
 
 
 def workspace_of_single_calls(A: Body, B: Body) -> Workspace:
-    """The workspace of all single calls, deep enough for these bodies."""
-    global _single_space
-    space, n_stack = _single_space, stack_of(A.tree, B.tree)
-    if space is None or space.n_stack < n_stack:
-        space = _single_space = Workspace(max(512, n_stack))
-    return space
+    """The workspace of all single calls, deep enough for these bodies: a power of two, in entries."""
+    return _workspace_of_depth(1 << max(9, (stack_of(A.tree, B.tree) - 1).bit_length()))
+
+
+@workspace_under_lock
+def _workspace_of_depth(n_stack: int) -> Workspace:
+    return Workspace(n_stack)
 
 
 def prepared_facets(A: Body, B: Body) -> Prepared:

@@ -7,12 +7,13 @@ out of a solid, or out of another facet. The depth of the whole mesh is never le
 from __future__ import annotations
 
 import math
-from functools import cache
+from collections.abc import Callable
 from struct import Struct
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from collide.base.free_threads import workspace_under_lock
 from collide.kernels import address_of
 from collide.kernels.prepared import prepared_row
 from collide.lowering.packed_convex import BLOCK, PackedConvex, on_cache_lines, pack_points
@@ -57,13 +58,18 @@ class SingleFacets:
         return None if self._ask(X_WA, X_WB, memory, True, math.inf) is None else memory
 
 
-@cache
+@workspace_under_lock
 def two_facets() -> SingleFacets:
     """Facets with facets."""
     return SingleFacets()
 
 
-@kept_with_shape("_single_facets")
 def facets_with(solid: Shape) -> SingleFacets:
     """Facets with a shape that is a single convex set."""
-    return SingleFacets(convex_set_of(solid))
+    return _facets_with(solid)()
+
+
+@kept_with_shape("_single_facets")
+def _facets_with(solid: Shape) -> Callable[[], SingleFacets]:
+    convex = convex_set_of(solid)
+    return workspace_under_lock(lambda: SingleFacets(convex))
