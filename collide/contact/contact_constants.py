@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide.contact import curved_contacts, curved_manifolds
+from collide.contact import curved_contact_call, curved_manifolds
 from collide.contact.compound_contact_call import COMPOUND_HEADER
 from collide.contact.contact_facets import TOPOLOGY
 from collide.contact.curved_contact_call import CURVED_HEADER
-from collide.contact.facet_contact_call import FACETS_HEADER
+from collide.contact.facet_contact_call import FACETS_HEADER, PAIRS_OF_SINGLE_CALLS, ROWS_OF_SINGLE_CALLS
 from collide.contact.facet_manifolds import workspace_words
-from collide.contact.mesh_contacts import PAIRS_OF_SINGLE_CALLS, ROWS_OF_SINGLE_CALLS
 from collide.contact.support_face import ROUND
 from collide.kernels import entry, view_i64
 
 #: In this order (`native/capi_mesh_contacts.c`, `native/capi_compound_contacts.c`,
-#: `native/capi_curved_contacts.c`).
+#: `native/capi_curved_contact_call.c`).
 _CONSTANTS = np.array(
     [
         FACETS_HEADER, TOPOLOGY, PAIRS_OF_SINGLE_CALLS, ROWS_OF_SINGLE_CALLS, workspace_words(PAIRS_OF_SINGLE_CALLS),
-        COMPOUND_HEADER, CURVED_HEADER, curved_contacts.FACETS_OF_SINGLE_CALLS, curved_contacts.ROWS_OF_SINGLE_CALLS,
-        curved_manifolds.workspace_words(curved_contacts.FACETS_OF_SINGLE_CALLS, ROUND),
+        COMPOUND_HEADER, CURVED_HEADER,
+        curved_contact_call.FACETS_OF_SINGLE_CALLS, curved_contact_call.ROWS_OF_SINGLE_CALLS,
+        curved_manifolds.workspace_words(curved_contact_call.FACETS_OF_SINGLE_CALLS, ROUND),
     ],
     dtype=np.int64,
 )

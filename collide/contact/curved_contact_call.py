@@ -36,6 +36,9 @@ _curved_manifolds_at = native_call(SIGNATURE)
     STARTS, _END_OF_FACETS, _END, _LACKS, MANIFOLDS,
 ) = range(16)
 CURVED_HEADER = MANIFOLDS + HEADER
+#: Facets whose boxes are near the shape, fewer than MAX_ASKED, and rows, that a single call has space for: more are
+#: left to the long way.
+FACETS_OF_SINGLE_CALLS, ROWS_OF_SINGLE_CALLS = 448, 1024
 #: A length that is longer than the depth by no more than this part is as good as one can be.
 AS_GOOD = 1.0 + 2.0**-10
 

@@ -18,8 +18,10 @@ from collide.contact.contact_rows import CONTACT_DTYPE, OVERLAP, Rows, Slack, jo
 from collide.contact.curved_contact_call import (
     AS_GOOD,
     CURVED_HEADER,
+    FACETS_OF_SINGLE_CALLS,
     MANIFOLDS,
     REACH_OF_BOTH,
+    ROWS_OF_SINGLE_CALLS,
     STARTS,
     contacts_single_curved,
 )
@@ -63,9 +65,6 @@ _FACETS_OF_PIECE, MAX_FACETS, _POSES_OF_PIECE = 1 << 16, 1 << 18, 256
 _FIRST_ROWS, _ROWS_PER_POSE = 64, 8
 #: Facets are looked at that are farther than a limit by this part of the size: their rows tell what is near.
 _LEEWAY = 2.0**-36
-#: Facets whose boxes are near the shape, fewer than MAX_ASKED, and rows, that a single call has space for: more are
-#: left to the long way.
-FACETS_OF_SINGLE_CALLS, ROWS_OF_SINGLE_CALLS = 448, 1024
 #: Lengths tried where slabs prove one longer than the depth, in depths.
 _LENGTHS = (1.0 + 2.0**-20, 1.0 + 2.0**-7, 1.25, 2.0, 4.0)
 #: Facets asked first whether a set moved clears them.

@@ -14,6 +14,8 @@ _facet_manifolds_at = native_call(SIGNATURE)
 # (a double) [m]; of the call where its rows end, and what they lack. Then the header of `facet_manifolds.py`.
 KERNEL, N_ROWS, REACH_OF_BOTH, _END, _LACKS, MANIFOLDS = range(6)
 FACETS_HEADER = MANIFOLDS + CONTACT_HEADER
+#: Pairs of facets, and rows, that a single call has space for; calls of more are left to the long way.
+PAIRS_OF_SINGLE_CALLS, ROWS_OF_SINGLE_CALLS = 1 << 12, 1 << 10
 
 
 @entry(prepared.CONTACTS, nogil=False)

@@ -17,7 +17,9 @@ from collide.contact.facet_contact_call import (
     KERNEL,
     MANIFOLDS,
     N_ROWS,
+    PAIRS_OF_SINGLE_CALLS,
     REACH_OF_BOTH,
+    ROWS_OF_SINGLE_CALLS,
     contacts_single_facets,
 )
 from collide.contact.facet_manifolds import (
@@ -59,8 +61,6 @@ from collide.shapes.shape import Shape
 _FEWEST_PAIRS, _KEPT_PAIRS, MAX_PAIRS = 1 << 12, 1 << 14, 1 << 18
 #: Space that has grown is kept for so many calls, at most 75 MB; to grow it again lists the pairs of one call twice.
 _CALLS_KEPT = 256
-#: Pairs of facets, and rows, that a single call has space for; calls of more are left to the long way.
-PAIRS_OF_SINGLE_CALLS, ROWS_OF_SINGLE_CALLS = 1 << 12, 1 << 10
 #: Rows there is space for to begin with, and so many more a pose.
 _FIRST_ROWS, _ROWS_PER_POSE = 64, 8
 #: Poses that are worth a thread of their own.

@@ -14,15 +14,15 @@ import numpy as np
 
 from collide.errors import UnsupportedQuery
 from collide.hull.exact_hull import convex_hull
-from collide.kernels import address_of, entry, view_f64
+from collide.kernels import address_of
 from collide.lowering.kind_of_shape import kind_of
 from collide.lowering.kinds import WITH_FACETS
 from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.parts import convex_set_of, is_single_convex
 from collide.mesh.build_bvh import build_mesh_tree
 from collide.mesh.bvh import REACH, MeshTree
+from collide.mesh.facet_reach import reach_of_facets
 from collide.mesh.mesh_survey import one_of_each_part
-from collide.numerics.vec3 import dot, sub, vec3_at
 from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
 from collide.shapes.shape import Shape, checked_shape, held_by, kept_with_shape
@@ -161,13 +161,3 @@ def made_body(shape: Shape, tree: MeshTree, solid: bool, radius: float, points: 
     """A body over the facets of a tree; parameters as of `Body`."""
     reach = reach_of_facets(address_of(tree.triangles), len(tree.triangles), address_of(tree.numbers))
     return Body(held_by(shape, shape), tree, solid, radius, np.ascontiguousarray(points), tree.centre, reach)
-
-
-@entry("float64(int64, int64, int64)")
-def reach_of_facets(triangles_at, n, centre_at):
-    """How far the corners of n facets, nine doubles each, reach from a centre, rounded upwards [m]."""
-    centre, square = vec3_at(view_f64(centre_at, 3), 0), 0.0
-    for k in range(3 * n):
-        out = sub(vec3_at(view_f64(triangles_at + 24 * k, 3), 0), centre)
-        square = max(square, dot(out, out))
-    return math.sqrt(square) * (1.0 + 1e-12)

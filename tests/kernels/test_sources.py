@@ -29,7 +29,7 @@ def test_the_list_holds_what_defines_kernels_and_what_these_see(copy):
     names = sources.kernel_sources()
     assert {"narrowphase/gjk/gjk.py", "numerics/digits.py", "results.py", "kernels/vectors.py"} <= set(names)
     assert not {"__init__.py", "pairs/query.py", "shapes/mesh.py", "kernels/jit.py", "kernels/library.py"} & set(names)
-    assert 80 < len(names) < 360 and sum(os.path.getsize(copy / name) for name in names) < 3e6
+    assert 80 < len(names) < 380 and sum(os.path.getsize(copy / name) for name in names) < 3e6
 
 
 def test_the_checksum_changes_with_every_source_of_kernels_and_with_nothing_else(copy):
