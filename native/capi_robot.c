@@ -24,10 +24,10 @@ static void begin_scene(collide_robot_workspace *space, const int64_t *m)
     const collide_robot *robot = space->robot;
     const int64_t *n = robot->sizes;
     int64_t *scene = space->scene, *header = scene, around = n[F_PARTS] - n[F_LINK_PARTS];
-    double *places;
     SHARED(JOINT_INTS_AT, joint_ints), SHARED(JOINT_DOUBLES_AT, joint_doubles), SHARED(BASE_AT, scalars);
     SHARED(BODIES_AT, bodies), SHARED(BODY_BOXES_AT, body_boxes), SHARED(SELF_PAIRS_AT, self_pairs), SHARED(PARTS_AT, parts);
-    SHARED(PART_BOXES_AT, part_boxes), SHARED(IS_BOUND_AT, is_bound), SHARED(NODES_AT, nodes), SHARED(NODE_LINKS_AT, node_links);
+    SHARED(PART_BOXES_AT, part_boxes), SHARED(IS_BOUND_AT, is_bound), SHARED(NODE_LINKS_AT, node_links);
+    SHARED(PART_POSES_AT, part_poses);
     SHARED(UNBOUNDED_AT, unbounded), SHARED(BODY_OF_AT, body_of), SHARED(ALLOWED_AT, allowed), SHARED(SHAPE_INTS_AT, shape_rows);
     SHARED(SHAPE_NUMBERS_AT, shape_numbers), SHARED(TERMS_AT, poses), SHARED(SHAPE_OF_PART_AT, shape_of);
     scene[N_JOINTS] = n[F_JOINTS], scene[ROOT] = n[F_ROOT], scene[N_LINKS] = n[F_LINKS], scene[N_BODIES] = n[F_BODIES];
@@ -44,9 +44,7 @@ static void begin_scene(collide_robot_workspace *space, const int64_t *m)
     ZEROED(PAIR_AT, 2, 8), ZEROED(ROW_AT, 1, sizeof(collide_pair)), ZEROED(PAIR_DOUBLES_AT, m[M_DOUBLES], sizeof(double));
     ZEROED(PAIR_INTEGERS_AT, m[M_INTEGERS], 8), ZEROED(OPEN_AT, OPEN_INTS * scene[OPEN_CAPACITY], 8), ZEROED(WALKS_AT, around + 1, 8);
     memcpy(&scene[SLACK], &robot->scalars[S_SLACK], sizeof(double));
-    if (space->arena.failed) return;
-    places = (double *)(intptr_t)scene[PART_PLACES_AT] + POSE * n[F_LINK_PARTS];
-    memcpy(places, robot->poses, (size_t)(POSE * around) * sizeof(double));
+    begin_around(space);
 }
 
 static void begin_spheres(collide_robot_workspace *space)

@@ -9,7 +9,7 @@
 enum {
     JOINT_INTS = 5, JOINT_DOUBLES = 23, BODY_INTS = 4, BOX = 6, PART = 19, NODE_LINK = 3, BODY_SPHERES = 5, SPHERE = 6,
     PART_NUMBERS = 6, MAP_INTS = 5, MAP_DOUBLES = 4,
-    LINK_POSE = 12, LANES = 8, OPEN_INTS = 4, OPEN_PAIR = 3, SPHERE_PLACE = 4, INTERVAL = 4, MAX_INTERVALS = 96, MAX_PIECES = 32,
+    LINK_POSE = 12, MATRIX = 16, LANES = 8, OPEN_INTS = 4, OPEN_PAIR = 3, SPHERE_PLACE = 4, INTERVAL = 4, MAX_INTERVALS = 96, MAX_PIECES = 32,
     ITEM = 4, OPEN_INTERVAL = 5, MAX_DEGREE = 15, CURSOR = 3, OPEN_SAMPLE = 2
 };
 
@@ -53,7 +53,7 @@ enum { OF_ROBOT = 0, OF_PAIR = 2, WITH_AROUND = 1, AMONG_ROBOT = 2 };
 
 /* What a file has as plain numbers (collide/robots/checker_file.py). */
 enum {
-    F_COLUMNS, F_SHAPES, F_HAS_SPHERES, F_HAS_MESHES, F_FACET_BODIES,
+    F_COLUMNS, F_SHAPES, F_HAS_SPHERES, F_HAS_MESHES, F_FACET_BODIES, F_HAS_MARGINS,
     F_LINKS, F_JOINTS, F_BODIES, F_LINK_PARTS, F_PARTS, F_SELF_PAIRS, F_AROUND, F_NODES, F_UNBOUNDED, F_ROOT, F_TWINS_AFTER,
     F_SPHERES, F_MAPS, F_FEWEST,
     F_STRIDE, F_ITEMS,
@@ -80,7 +80,9 @@ enum { S_BASE, S_SLACK = LINK_POSE, S_ROUNDING, S_COUNT };
     X(is_bound, uint8_t, n[F_PARTS])                                                                                      \
     X(shape_of, int64_t, n[F_PARTS])                                                                                      \
     X(poses, double, POSE * (n[F_PARTS] - n[F_LINK_PARTS]))                                                               \
+    X(part_poses, double, MATRIX * (n[F_PARTS] - n[F_LINK_PARTS]))                                                        \
     X(body_of, int64_t, n[F_PARTS] - n[F_LINK_PARTS])                                                                     \
+    X(around_poses, double, MATRIX * n[F_AROUND])                                                                         \
     X(self_pairs, int64_t, 2 * n[F_SELF_PAIRS])                                                                           \
     X(allowed, uint8_t, n[F_BODIES] * n[F_AROUND])                                                                        \
     X(nodes, double, BOX * n[F_NODES])                                                                                    \
@@ -136,7 +138,8 @@ struct collide_robot_workspace {
     double *samples, *sampled; /* configurations of a motion; samples left to others */
     double *intervals;         /* open ones, then pairs of meshes, half of the memory each */
     int64_t n_intervals;
-    struct arena arena; /* all that does not grow */
+    double *X_WBs, *moved, *boxes; /* of bodies around: poses as they stand, poses to be, boxes of their parts */
+    struct arena arena;            /* all that does not grow */
 };
 
 /* Which of n answers are left to Python. */
@@ -156,6 +159,9 @@ int are_configurations(const collide_robot_workspace *space, const double *q, si
 /* capi_robot_motions.c: room for motions, as a workspace begins; 0 where there is none. */
 int begin_motions(collide_robot_workspace *space);
 void end_motions(collide_robot_workspace *space);
+
+/* capi_robot_around.c: bodies around as the file has them, in a workspace's own tables. */
+void begin_around(collide_robot_workspace *space);
 
 /* capi_robot_meshes.c: bodies of facets, and whether questions name these alone; questions of a workspace, 0 without memory. */
 collide_status read_meshes(collide_robot *robot);

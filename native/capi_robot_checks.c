@@ -53,6 +53,16 @@ static int is_placement(const double *X)
     return 1;
 }
 
+/* n matrices of a body's pose, or of a part in its body. */
+static int are_matrices(const double *X, int64_t n)
+{
+    for (; n > 0; n--, X += MATRIX) {
+        const double rows[LINK_POSE] = {X[0], X[1], X[2], X[4], X[5], X[6], X[8], X[9], X[10], X[3], X[7], X[11]};
+        if (!is_placement(rows)) return 0;
+    }
+    return 1;
+}
+
 static int is_axis(const double *v) { return fabs(v[0] * v[0] + v[1] * v[1] + v[2] * v[2] - 1.0) <= 1e-3; }
 
 /* Links form a tree: every link but the root is the child of one joint, whose parent comes before. `seen` : a byte a link. */
@@ -110,7 +120,8 @@ static int are_parts(const collide_robot *robot)
         if (!is_placement(pose) || !are_coordinates(pose, POSE) || pose[POSE_TERMS] != -1.0) return 0;
     }
     return are_numbers(robot->part_boxes, BOX * n[F_PARTS]) && are_indices(robot->shape_of, n[F_PARTS], n[F_SHAPES]) &&
-           are_indices(robot->body_of, around, n[F_AROUND]);
+           are_indices(robot->body_of, around, n[F_AROUND]) && are_matrices(robot->part_poses, around) &&
+           are_matrices(robot->around_poses, n[F_AROUND]);
 }
 
 /* A walk goes on to the next node or to one behind it, and meets every part around once at most. `seen` : a byte a part. */

@@ -26,7 +26,7 @@ static int robot_layouts_fit(const struct collide_kernels *kernels)
 static int is_file(const struct collide_kernels *kernels, const int64_t *file, int64_t n_words)
 {
     int64_t digest[2], memory[DIGEST_WORDS];
-    if (memcmp(file, "COLLIDER", 8) != 0 || file[VERSION] != 1 || file[WORDS] != n_words) return 0;
+    if (memcmp(file, "COLLIDER", 8) != 0 || file[VERSION] != 2 || file[WORDS] != n_words) return 0;
     kernels->digest_numbers(address_of(file + MESSAGE), n_words - MESSAGE, 0, 0, 0, 0, address_of(memory), address_of(digest));
     return memcmp(file + FILE_DIGEST, digest, sizeof digest) == 0;
 }
@@ -53,7 +53,8 @@ static int view_sections(collide_robot *robot, int64_t n_words)
     n = robot->sizes;
     if (robot->counts[SECTION_sizes] != F_SIZES) return 0;
     for (k = 0; k < F_SIZES; k++) if (n[k] < 0 || n[k] > LARGEST_SIZE) return 0;
-    if (n[F_HAS_SPHERES] > 1 || n[F_HAS_MESHES] > 1 || (n[F_FACET_BODIES] > 0 && n[F_HAS_MESHES] == 0) || n[F_ROOT] >= n[F_LINKS] || n[F_LINK_PARTS] > n[F_PARTS] || n[F_TWINS_AFTER] > n[F_LINK_PARTS])
+    if (n[F_HAS_SPHERES] > 1 || n[F_HAS_MESHES] > 1 || n[F_HAS_MARGINS] > 1 || (n[F_FACET_BODIES] > 0 && n[F_HAS_MESHES] == 0) ||
+        n[F_ROOT] >= n[F_LINKS] || n[F_LINK_PARTS] > n[F_PARTS] || n[F_TWINS_AFTER] > n[F_LINK_PARTS])
         return 0;
 #define X(name, type, count)                                                                        \
     if ((count) >= 0 && robot->counts[SECTION_##name] != (int64_t)(count)) return 0;

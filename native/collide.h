@@ -716,11 +716,25 @@ COLLIDE_API size_t collide_robot_around(const collide_robot *robot);
 COLLIDE_API const char *collide_robot_column_name(const collide_robot *robot, size_t column);
 COLLIDE_API const char *collide_robot_body_name(const collide_robot *robot, int32_t body);
 
-/* Scratch memory of questions about one robot, one a thread; made where a planner starts, not at every question. */
+/* Scratch memory of questions about one robot, one a thread; made where a planner starts, not at every question. Bodies around
+   stand in it where the file has them, until they are moved. */
 typedef struct collide_robot_workspace collide_robot_workspace;
 
 COLLIDE_API collide_status collide_robot_workspace_create(const collide_robot *robot, collide_robot_workspace **workspace);
 COLLIDE_API void collide_robot_workspace_free(collide_robot_workspace *workspace);
+
+/* Give n bodies around other poses X_WB, 16 doubles each, by their numbers in rows: -1 - k of body k around, which
+   `collide_robot_body_name` names. Of a body named twice the last pose counts; all others stay. For the questions of this workspace
+   alone, between any two: the robot stays as it was loaded, so that threads with workspaces of their own are not disturbed, and each
+   thread moves its own. Answers are then those of a checker in Python whose World has moved, bit by bit. O(parts and nodes around).
+   Where it is not COLLIDE_OK nothing has moved: COLLIDE_INVALID_ARGUMENT or COLLIDE_INVALID_POSE, *failed, unless NULL, is the first
+   of n to blame; COLLIDE_UNSUPPORTED where bodies around were saved with margins, or where the entries of |R^T R - 1| add up to
+   1e-13 or more: make such matrices orthonormal first. */
+COLLIDE_API collide_status collide_robot_move_around(collide_robot_workspace *workspace, const int32_t *bodies, size_t n,
+                                                     const double *X_WBs, size_t *failed);
+
+/* Where a body around, -1 - k of body k, stands for a workspace: as in the file, or as it was moved. */
+COLLIDE_API collide_status collide_robot_pose_around(const collide_robot_workspace *workspace, int32_t body, double X_WB[16]);
 
 /* Whether each of n configurations collides: hits[k]. A few microseconds each, fastest eight and more at a time. */
 COLLIDE_API collide_status collide_robot_collide(collide_robot_workspace *workspace, const double *configurations, size_t n,

@@ -157,8 +157,8 @@ class CheckWorkspace:
         return {
             "bodies": self._bodies[:n], "body_boxes": self._body_boxes[:n], "parts": self._parts,
             "part_boxes": self._part_boxes, "is_bound": self._is_bound, "shape_of": self._shape_of,
-            "poses": buffers[layout.POSES_AT][n_link_parts:], "body_of": buffers[layout.BODY_OF_AT],
-            "self_pairs": setting.self_pairs, "allowed": setting.allowed,
+            "poses": buffers[layout.POSES_AT][n_link_parts:], "part_poses": buffers[layout.PART_POSES_AT],
+            "body_of": buffers[layout.BODY_OF_AT], "self_pairs": setting.self_pairs, "allowed": setting.allowed,
             "nodes": buffers[layout.NODES_AT] if nodes else np.zeros(0),
             "node_links": buffers[layout.NODE_LINKS_AT][:nodes] if nodes else np.zeros(0),
             "unbounded": buffers[layout.UNBOUNDED_AT],

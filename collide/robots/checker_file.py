@@ -24,7 +24,7 @@ from collide.robots.check_workspace import CheckWorkspace
 if TYPE_CHECKING:
     from collide.robots.checker_scene import CheckerScene
 
-MAGIC, VERSION = b"COLLIDER", 1
+MAGIC, VERSION = b"COLLIDER", 2
 #: Words before the digest's message: magic, version, words in all, digest.
 _HEAD = 5
 #: Words of a header that a file holds: how many there are of everything, then what else is a number.
@@ -40,11 +40,12 @@ SIZES = {
 SECTIONS = {
     "sizes": "<i8", "names": "u1", "scalars": "<f8", "joint_ints": "<i8", "joint_doubles": "<f8", "moves": "u1",
     "shape_ints": "<i8", "shape_numbers": "<f8", "points": "<f8", "bodies": "<i8", "body_boxes": "<f8", "parts": "<f8",
-    "part_boxes": "<f8", "is_bound": "u1", "shape_of": "<i8", "poses": "<f8", "body_of": "<i8", "self_pairs": "<i8",
-    "allowed": "u1", "nodes": "<f8", "node_links": "<i8", "unbounded": "<i8", "sphere_counts": "<i8",
-    "around_bodies": "<f8", "sphere_rows": "<f8", "part_kinds": "<i8", "part_numbers": "<f8", "map_ints": "<i8",
-    "map_doubles": "<f8", "map_cells": "u1", "paths": "<i8", "path_lengths": "<i8", "between": "<i8",
-    "questions": "<i8", "facet_ints": "<i8", "facet_numbers": "<f8", "facet_vertices": "<f8", "facet_faces": "<i8",
+    "part_boxes": "<f8", "is_bound": "u1", "shape_of": "<i8", "poses": "<f8", "part_poses": "<f8", "body_of": "<i8",
+    "around_poses": "<f8", "self_pairs": "<i8", "allowed": "u1", "nodes": "<f8", "node_links": "<i8",
+    "unbounded": "<i8", "sphere_counts": "<i8", "around_bodies": "<f8", "sphere_rows": "<f8",
+    "part_kinds": "<i8", "part_numbers": "<f8", "map_ints": "<i8", "map_doubles": "<f8", "map_cells": "u1",
+    "paths": "<i8", "path_lengths": "<i8", "between": "<i8", "questions": "<i8", "facet_ints": "<i8",
+    "facet_numbers": "<f8", "facet_vertices": "<f8", "facet_faces": "<i8",
 }
 
 
@@ -83,15 +84,16 @@ def _sections(checker: CheckerScene, space: CheckWorkspace) -> dict[str, np.ndar
     meshes = space.mesh_tables()
     has_meshes, n_facet_bodies = int(len(meshes["facet_numbers"]) > 0), len(meshes["facet_ints"])
     counts = robot.dof, len(setting.table.packed), int(setting.spheres is not None), has_meshes, n_facet_bodies
+    around = setting.surroundings
     names = [*robot.joint_names, *checker.bodies, *checker.around]
     slack = space.header[layout.SLACK : layout.SLACK + 1].view(np.float64)
     rounding = paths.header[motions.ROUNDING :].view(np.float64)
     return {
-        "sizes": np.array([*counts, *sizes]),
+        "sizes": np.array([*counts, int(around.has_margins), *sizes]),
         "names": np.frombuffer("".join(f"{name}\0" for name in names).encode(), dtype=np.uint8),
         "scalars": np.concatenate([setting.base, slack, rounding]), "joint_ints": robot.joint_table.ints,
-        "joint_doubles": robot.joint_table.doubles, "moves": robot.moves, **_shapes(setting.table), **made, **spheres,
-        **paths.tables(), **meshes,
+        "joint_doubles": robot.joint_table.doubles, "moves": robot.moves, **_shapes(setting.table), **made,
+        "around_poses": np.array([body.X_WB for body in around.bodies]), **spheres, **paths.tables(), **meshes,
     }
 
 

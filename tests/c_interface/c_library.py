@@ -205,6 +205,8 @@ _TYPES = {
     "collide_robot_body_name": [c_void_p, c_int],
     "collide_robot_workspace_create": [c_void_p, c_void_p],
     "collide_robot_workspace_free": [c_void_p],
+    "collide_robot_move_around": [c_void_p, c_void_p, c_size_t, c_void_p, POINTER(c_size_t)],
+    "collide_robot_pose_around": [c_void_p, c_int, c_void_p],
     "collide_robot_collide": [c_void_p, c_void_p, c_size_t, c_void_p, c_void_p, POINTER(c_size_t)],
     "collide_robot_distance": [
         c_void_p, c_void_p, c_size_t, c_double, c_uint, c_void_p, c_void_p, c_void_p, POINTER(c_size_t),
@@ -631,6 +633,17 @@ class CRobot:
         assert status == (statuses[wrong[0]] if len(wrong) else OK), (name, status)
         assert failed.value == (wrong[0] if len(wrong) else 0)
         return statuses
+
+    def move(self, bodies: list[int], X_WBs: np.ndarray) -> tuple[int, int]:
+        """(status, number of the first to blame) of bodies around given other poses (n, 4, 4)."""
+        failed, numbers = c_size_t(77), np.array(bodies, dtype=np.int32)
+        given = numbers.ctypes.data, len(bodies), _doubles(np.asarray(X_WBs)).ctypes.data
+        return library().collide_robot_move_around(self.workspace, *given, failed), failed.value
+
+    def pose(self, body: int) -> np.ndarray:
+        X_WB = np.full((4, 4), 7.0)
+        assert library().collide_robot_pose_around(self.workspace, body, X_WB.ctypes.data) == OK
+        return X_WB
 
     def collides(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         hits = np.full(len(q), 7, dtype=np.uint8)

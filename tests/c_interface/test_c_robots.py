@@ -3,6 +3,7 @@ by bit; files that lie are refused or harmless."""
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import json
 import subprocess
@@ -261,6 +262,106 @@ def test_fields_around_are_refused_in_words(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+# --- bodies around that move ------------------------------------------------------------------------------------------
+
+
+def moved(rng, checker: collide.RobotChecker, robot: c.CRobot, n: int, reach: float) -> None:
+    """Give n bodies around other poses, in Python's World and in C; a body named twice takes the last."""
+    numbers = rng.choice(len(checker.around), size=n, replace=False)
+    X_WBs = np.array([random_pose(rng, reach) for _ in numbers])
+    for number, X_WB in zip(numbers.tolist(), X_WBs):
+        checker.world.set_pose(checker.around[number], X_WB)
+    before = -1 - np.concatenate([numbers[:1], numbers])
+    assert robot.move(before.tolist(), np.concatenate([[random_pose(rng, reach)], X_WBs])) == (c.OK, 0)
+    for number, name in enumerate(checker.around):
+        assert (robot.pose(-1 - number) == checker.world.body(name).X_WB).all()
+
+
+def scene_that_moves(form: str, rng) -> collide.RobotChecker:
+    if form == "spheres":
+        return scene_of_spheres(rng, 12)
+    world = crowd(rng, 10, 1.5)
+    robot = random_robot(rng, shape=mesh_shape, size=0.15) if form == "meshes" else random_robot(rng)
+    for k in range(6 * (form == "meshes")):
+        world.add(mesh_shape(rng, 0.3), random_pose(rng, 0.8), name=f"mesh{k}")
+    checker = collide.RobotChecker(robot, world, padding=0.01)
+    checker.attach("part", checker.bodies[0], collide.Box(0.1, 0.1, 0.2), pose(t=(0, 0, 0.1)), touch=["b0"])
+    return checker
+
+
+@pytest.mark.parametrize("form", ["hulls", "spheres", "meshes"])
+def test_bodies_moved_in_c_have_pythons_bits(form, tmp_path):
+    """After every move C has the bits of the checker whose World moves, and the booleans of a checker made anew."""
+    rng = rng_of("moved in C", form)
+    checker = scene_that_moves(form, rng)
+    robot, q = c.CRobot(saved(checker, tmp_path)), random_configurations(rng, checker.robot, 30)
+    told, changed = Counter(), 0
+    before = checker.collides(q)
+    for n in (1, 3, len(checker.around)):
+        moved(rng, checker, robot, n, 1.2 if form == "hulls" else 0.7)
+        told += compared(checker, robot, q, q + rng.normal(size=q.shape) * 0.05)
+        statuses, hits = robot.collides(q)
+        good, anew = statuses == c.OK, copy.copy(checker).collides(q)
+        assert (hits[good] == anew[good]).all()
+        changed, before = changed + int((hits[good] != before[good]).sum()), anew
+    assert told["hits"] > 20 and told["free"] > 15 and told["rows"] > 150 and changed > 3, (told, changed)
+    assert (told["near"] > 50) == (form == "hulls") and told["edges 1"] > 10 and told["edges 2"] > 10, told
+
+
+def test_workspaces_move_bodies_apart(tmp_path):
+    """Of threads each moves bodies in its own workspace: the others' answers, and a new workspace's, stay."""
+    rng = rng_of("moved by threads in C")
+    robot, q = random_robot(rng), None
+    content = saved(collide.RobotChecker(robot, crowd(rng, 10, 1.0)), tmp_path)
+    loaded, q = c.CRobot(content), random_configurations(rng, robot, 50)
+    first = loaded.collides(q)[1]
+    scenes = [np.array([random_pose(rng, 0.6) for _ in range(10)]) for _ in range(8)]
+
+    def work(X_WBs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        own = c.CRobot.__new__(c.CRobot)
+        own.__dict__.update(loaded.__dict__, workspace=c.raw_handle("collide_robot_workspace_create", loaded.handle))
+        before = c.CRobot.collides(own, q)[1]
+        assert own.move([-1 - k for k in range(10)], X_WBs) == (c.OK, 0)
+        hits = c.CRobot.collides(own, q)[1]
+        c.library().collide_robot_workspace_free(own.workspace)
+        own.workspace = None
+        return before, hits
+
+    with ThreadPoolExecutor(4) as pool:
+        answers = [*pool.map(work, scenes)]
+    for X_WBs, (before, hits) in zip(scenes, answers):
+        again = c.CRobot(content)
+        assert again.move([-1 - k for k in range(10)], X_WBs) == (c.OK, 0)
+        assert (before == first).all() and (again.collides(q)[1] == hits).all()
+    assert (loaded.collides(q)[1] == first).all() and len({hits.tobytes() for _, hits in answers}) > 4
+
+
+def test_moves_that_are_refused_move_nothing(tmp_path):
+    rng = rng_of("refused moves in C")
+    robot, world = random_robot(rng), crowd(rng, 4, 0.6)
+    checker = collide.RobotChecker(robot, world)
+    made, q, X = c.CRobot(saved(checker, tmp_path)), random_configurations(rng, robot, 40), random_pose(rng, 0.3)
+    rows, library = made.distances(q)[1], c.library()
+    for number in (0, 1, -5, 2**31 - 1, -(2**31)):
+        assert made.move([-1, number], [X, X]) == (c.INVALID_ARGUMENT, 1), number
+        assert library.collide_robot_pose_around(made.workspace, number, X.ctypes.data) == c.INVALID_ARGUMENT
+    for odd in c.odd_poses():
+        assert made.move([-2, -1, -2], [X, odd, X]) == (c.INVALID_POSE, 1), odd
+    skewed = X.copy()
+    skewed[:3, 0] *= 1.0 + 1e-12
+    assert made.move([-2, -1], [X, skewed]) == (c.UNSUPPORTED, 0)
+    number, failed = np.array([-1], dtype=np.int32), c.c_size_t(9)
+    assert library.collide_robot_move_around(None, number.ctypes.data, 1, X.ctypes.data, failed) == c.INVALID_ARGUMENT
+    assert library.collide_robot_move_around(made.workspace, None, 1, X.ctypes.data, failed) == c.INVALID_ARGUMENT
+    assert library.collide_robot_move_around(made.workspace, number.ctypes.data, 1, None, failed) == c.INVALID_ARGUMENT
+    assert library.collide_robot_move_around(made.workspace, None, 0, None, None) == c.OK and failed.value == 0
+    assert made.distances(q)[1].tobytes() == rows.tobytes()
+    assert made.move([-1], [X]) == (c.OK, 0) and made.distances(q)[1].tobytes() != rows.tobytes()
+    world.set_margin("b1", 0.01)
+    swollen = c.CRobot(saved(checker, tmp_path))
+    assert swollen.move([-1], [X]) == (c.UNSUPPORTED, 0) and (swollen.pose(-1) == world.body("b0").X_WB).all()
+
+
 # --- files that lie ---------------------------------------------------------------------------------------------------
 
 
@@ -324,6 +425,9 @@ def survivors(path: str, first: int, n: int) -> dict[str, list[int]]:
         robot.near(q[:4], 0.2)
         robot.certify(q[:4], q[4:8], 0.5)
         robot.sample(q[:4], q[4:8], 0.5)
+        if c.library().collide_robot_around(robot.handle) and robot.move([-1], [np.eye(4)])[0] == c.OK:
+            robot.collides(q)
+            robot.distances(q[:4])
     return told
 
 
