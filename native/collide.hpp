@@ -476,6 +476,14 @@ public:
         });
     }
 
+    std::vector<collide_contact> contacts(const Mesh &mesh, const Shape &shape, const Pose &X_WM, const Pose &X_WS,
+                                          double margin = 0.0, std::size_t max_contacts = 4, unsigned flags = 0) {
+        return all_rows<collide_contact>([&](auto... out) {
+            return collide_mesh_shape_contacts(get(), mesh.get(), shape.get(), X_WM.data(), X_WS.data(), margin, max_contacts,
+                                               flags, out...);
+        });
+    }
+
     // How far A can be moved along a direction until it touches B.
     Answered<collide_first_contact> cast_batch(const Shape &A, const Shape &B, Poses X_WA, Poses X_WB, Vectors directions,
                                                double max_distance = infinity, unsigned flags = 0) {
@@ -483,6 +491,13 @@ public:
         return answered<collide_first_contact>(n, [&](auto... out) {
             return collide_cast_batch(get(), A.get(), B.get(), X_WA, X_WB, directions, max_distance, flags, out...);
         });
+    }
+    collide_first_contact cast(const Compound &A, const Compound &B, const Pose &X_WA, const Pose &X_WB, const Vector &direction,
+                               double max_distance = infinity, unsigned flags = 0) {
+        collide_first_contact first;
+        require(collide_compound_cast(get(), A.get(), B.get(), X_WA.data(), X_WB.data(), direction.data(), max_distance, flags,
+                                      &first));
+        return first;
     }
     // When A and B first touch on their ways from the first poses to the second, turning the shortest way.
     Answered<collide_time_of_impact> impact_batch(const Shape &A, const Shape &B, Poses X_WA0, Poses X_WA1, Poses X_WB0,
@@ -493,10 +508,14 @@ public:
             return collide_impact_batch(get(), A.get(), B.get(), &motions, tolerance, flags, out...);
         });
     }
-    // Where rays first meet a shape or a mesh.
+    // Where rays first meet a shape, a union or a mesh.
     Answered<collide_ray_hit> raycast(const Shape &shape, Poses X_WA, Vectors origins, Vectors directions,
                                       double max_distance = infinity, unsigned flags = 0) {
         return rays(collide_raycast, shape, X_WA, origins, directions, max_distance, flags);
+    }
+    Answered<collide_ray_hit> raycast(const Compound &compound, Poses X_WA, Vectors origins, Vectors directions,
+                                      double max_distance = infinity, unsigned flags = 0) {
+        return rays(collide_compound_raycast, compound, X_WA, origins, directions, max_distance, flags);
     }
     Answered<collide_ray_hit> raycast(const Mesh &mesh, Poses X_WA, Vectors origins, Vectors directions,
                                       double max_distance = infinity, unsigned flags = 0) {
@@ -671,6 +690,7 @@ public:
     static Robot load(const std::string &path) { return Robot(made(collide_robot_load, path.c_str())); }
     static Robot read(Span<const std::uint8_t> bytes) { return Robot(made(collide_robot_read, bytes.data(), bytes.size())); }
     std::size_t columns() const { return collide_robot_columns(get()); }
+    std::size_t around() const { return collide_robot_around(get()); }
     std::string column_name(std::size_t column) const { return text(collide_robot_column_name(get(), column)); }
     // Of a body by its number in rows: -1 - k of body k around.
     std::string body_name(std::int32_t body) const { return text(collide_robot_body_name(get(), body)); }
@@ -702,6 +722,21 @@ class RobotWorkspace : public Owner<collide_robot_workspace, collide_robot_works
 public:
     explicit RobotWorkspace(const Robot &robot)
         : Owner(made(collide_robot_workspace_create, robot.get())), columns_(robot.columns()) {}
+
+    // Bodies around, by their numbers -1 - k, to other poses, for the questions of this workspace.
+    void move_around(std::int32_t body, const Pose &X_WB) { move_around({&body, 1}, {&X_WB, 1}); }
+    void move_around(Span<const std::int32_t> bodies, Span<const Pose> X_WBs) {
+        std::size_t failed = none;
+        if (bodies.size() != X_WBs.size()) throw Error(COLLIDE_INVALID_ARGUMENT);
+        if (bodies.empty()) return;
+        collide_status status = collide_robot_move_around(get(), bodies.data(), bodies.size(), X_WBs.data()->data(), &failed);
+        require(status, status == COLLIDE_UNSUPPORTED ? none : failed);
+    }
+    Pose pose_around(std::int32_t body) const {
+        Pose X_WB;
+        require(collide_robot_pose_around(get(), body, X_WB.m.data()));
+        return X_WB;
+    }
 
     Answered<std::uint8_t> collides(Span<const double> configurations) {
         std::size_t n = rows(configurations, columns_);

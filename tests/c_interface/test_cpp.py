@@ -237,6 +237,13 @@ int main() {
     for (const auto &row : space.contacts(gripper, single, here, Pose::at(0.0, 0.0, -0.61), 0.02))
         say("of parts", row.distance);
 
+    for (const auto &row : space.contacts(mesh, rod, here, Pose::at(0.2, 0.2, -0.395), 0.02, 8))
+        say("rod", row.distance);
+    collide_first_contact first = space.cast(gripper, single, up, here, Vector{0.0, 0.1, -2.0}, 5.0);
+    say("cast of union", first.distance, first.lower, first.upper, first.hit, first.part_a, first.part_b);
+    for (const auto &row : space.raycast(gripper, here, origins, down).rows)
+        say("ray at union", row.distance, row.hit, row.part);
+
     World world;
     std::int32_t floor = world.add(block, Pose(), true), top = world.add(ball, up);
     std::int32_t third = world.add(mesh, Pose::at(3.0, 0.0, 0.0)), last = world.add(rod, Pose::at(5.0, 0.0, 0.0));
@@ -294,6 +301,13 @@ def test_unions_casts_and_worlds_are_pythons(tmp_path):
     lines += _said("union", collide.collide(gripper, block, here, fall))
     lines += _pairs("of union", collide.distance(gripper, block, here, fall))
     lines += _said("of parts", collide.contacts(gripper, block, here, _at(0, 0, -0.61), margin=0.02).distance)
+    rods = collide.contacts(mesh, rod, here, _at(0.2, 0.2, -0.395), margin=0.02)
+    assert len(rods) > 4
+    lines += _said("rod", rods.distance)
+    cast = collide.shape_cast(gripper, up, [0.0, 0.1, -2.0], block, here, max_distance=5.0)
+    lines += _said("cast of union", cast.distance, cast.lower, cast.upper, cast.hit, cast.item_a, cast.item_b)
+    ray = collide.raycast(gripper, here, origins, down)
+    lines += _said("ray at union", ray.distance, ray.hit, ray.item)
     lines += _of_world(block, ball, rod, mesh, up, np.array(origins), np.array([down, down]))
     assert _run(_built(tmp_path, _BODIES)).decode().splitlines() == lines
 
@@ -351,6 +365,18 @@ int main() {
     put(certified.rows);
     put(certified.times);
     put(sampled.rows);
+    const std::vector<std::int32_t> around = {-1, -2};
+    space.move_around(around, std::vector<Pose>{Pose::at(0.3, 0.1, 0.0), Pose::at(-0.2, 0.1, 0.1)});
+    space.move_around(-1, Pose::at(0.2, 0.0, 0.1));
+    put(space.collides(q).rows);
+    put(space.distances(q, infinity, COLLIDE_WITH_AROUND).gradients);
+    if (robot.around() != 2 || space.pose_around(-1)(2, 3) != 0.1 || space.pose_around(-2)(0, 3) != -0.2) return 6;
+    try {
+        space.move_around(-3, Pose());
+        return 7;
+    } catch (const Error &error) {
+        if (error.status() != COLLIDE_INVALID_ARGUMENT || error.index() != 0) return 8;
+    }
     if (robot.column_name(0).empty() || robot.body_name(0).empty() || robot.body_name(-1) != "ball") return 5;
     try {
         space.collides({q.data(), robot.columns() + 1});
@@ -381,6 +407,10 @@ def test_robots_are_pythons(tmp_path):
         hits.astype(np.uint8), np.stack([nearest.distance, nearest.lower, nearest.b], axis=1).astype(float),
         nearest.gradient, pairs.starts, pairs.gradient, verdicts, edges.time, sampled.astype(np.uint8),
     ]
+    world.set_pose("ball", _at(0.2, 0, 0.1))
+    world.set_pose("crate", _at(-0.2, 0.1, 0.1))
+    assert (checker.collides(q) != hits).any()
+    wanted += [checker.collides(q).astype(np.uint8), checker.distances(q, between="world").gradient]
     assert told == b"".join(column.tobytes() for column in wanted)
 
 
