@@ -59,4 +59,8 @@ collide_status row_of_pair(collide_workspace *space, const double *X_WA, const d
 collide_status unfinished_row_of_pair(collide_workspace *space, const double *X_WA, const double *X_WB, double limit, unsigned flags,
                                       collide_pair *row);
 
+/* Whether two convex shapes come within a margin, up to which their row was asked (capi_within.c). */
+collide_status within_by_row(collide_workspace *space, const collide_shape *A, const collide_shape *B, const double *X_WA,
+                             const double *X_WB, double margin, unsigned trust, const collide_pair *row, uint8_t *within);
+
 #endif

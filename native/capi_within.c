@@ -62,15 +62,20 @@ static collide_status grown_meet(collide_workspace *space, const collide_shape *
     return status;
 }
 
+collide_status within_by_row(collide_workspace *space, const collide_shape *A, const collide_shape *B, const double *X_WA,
+                             const double *X_WB, double margin, unsigned trust, const collide_pair *row, uint8_t *within)
+{
+    *within = row->hit || row->lower <= margin;
+    if (!*within || row->hit || row->upper <= margin) return COLLIDE_OK;
+    return grown_meet(space, A, B, X_WA, X_WB, margin, trust, within);
+}
+
 static collide_status decide(collide_workspace *space, const collide_shape *A, const collide_shape *B, const double *X_WA,
                              const double *X_WB, double margin, unsigned trust, uint8_t *within)
 {
     collide_pair row;
     collide_status status = row_of_pair(space, X_WA, X_WB, margin, trust | COLLIDE_UNSIGNED, &row);
-    if (status != COLLIDE_OK) return status;
-    *within = row.hit || row.lower <= margin;
-    if (!*within || row.hit || row.upper <= margin) return COLLIDE_OK;
-    return grown_meet(space, A, B, X_WA, X_WB, margin, trust, within);
+    return status == COLLIDE_OK ? within_by_row(space, A, B, X_WA, X_WB, margin, trust, &row, within) : status;
 }
 
 collide_status collide_within(collide_workspace *workspace, const collide_shape *A, const collide_shape *B, collide_poses X_WA,

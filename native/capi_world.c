@@ -28,7 +28,7 @@ const char *collide_workspace_message(const collide_workspace *workspace)
 
 /* --- memory --------------------------------------------------------------------------------------------------------- */
 
-static int resize(void *place, size_t n, size_t bytes)
+int resize(void *place, size_t n, size_t bytes)
 {
     void *memory, *old;
     memcpy(&old, place, sizeof old);
@@ -53,6 +53,7 @@ static int reserve(collide_world *world, size_t more)
           resize(&world->changed, rows, 8) && resize(&world->first, rows, 8) && resize(&world->is_whole, rows, 8) &&
           resize(&world->unbounded, rows, 8) && resize(&world->numbers, rows, 8) && resize(&world->is_moved, rows, 1) &&
           resize(&world->is_alive, rows, 1) && resize(&world->wholes, rows, sizeof *world->wholes) &&
+          resize(&world->margins, rows, sizeof(double)) && resize(&world->spread, rows, sizeof(double)) &&
           resize(&table->ints, rows, 8 * INTS) &&
           resize(&table->numbers, rows, NUMBERS * sizeof(double)) && resize((void *)&table->shapes, rows, sizeof *table->shapes) &&
           resize(&table->users, rows, sizeof(size_t)) && resize(&table->order, rows, sizeof(size_t)) &&
@@ -127,6 +128,10 @@ void collide_world_free(collide_world *world)
     free(world->tree.links);
     free(world->tree.scratch);
     free(world->allowed_keys);
+    free(world->margins);
+    free(world->spread);
+    free(world->margin_keys);
+    free(world->pair_margins);
     free(world->allowed_rows);
     collide_shape_free(world->point);
     free(world);
@@ -135,7 +140,7 @@ void collide_world_free(collide_world *world)
 /* --- which body ----------------------------------------------------------------------------------------------------- */
 
 /* The row of a body; -1 where there is none of this id. */
-static int64_t row_of_id(const collide_world *world, int32_t id)
+int64_t row_of_id(const collide_world *world, int32_t id)
 {
     size_t low = 0, high = world->n;
     if (id >= 0 && (size_t)id < high && world->ids[id] == id) low = high = (size_t)id; /* none before it was ever removed */
@@ -154,13 +159,24 @@ static collide_status unknown_body(collide_world *world, const char *caller, con
 }
 
 /* Whether ids are those of bodies. */
-static collide_status check_ids(collide_world *world, const char *caller, const char *what, const int32_t *ids, size_t n)
+collide_status check_ids(collide_world *world, const char *caller, const char *what, const int32_t *ids, size_t n)
 {
     size_t k;
     if (n > 0 && ids == NULL) return refuse(world->message, COLLIDE_INVALID_ARGUMENT, "%s: %s is NULL", caller, what);
     for (k = 0; k < n; k++)
         if (row_of_id(world, ids[k]) < 0) return unknown_body(world, caller, what, k, ids[k]);
     return COLLIDE_OK;
+}
+
+collide_status check_pairs(collide_world *world, const char *caller, const int32_t *pairs, size_t n)
+{
+    collide_status status = check_ids(world, caller, "pairs", pairs, 2 * n);
+    size_t k;
+    for (k = 0; k < n && status == COLLIDE_OK; k++)
+        if (pairs[2 * k] == pairs[2 * k + 1])
+            status = refuse(world->message, COLLIDE_INVALID_ARGUMENT,
+                            "%s: pair %zu is body %ld twice; a body is never tested against itself", caller, k, (long)pairs[2 * k]);
+    return status;
 }
 
 /* Whether n matrices are poses. ids : of the bodies, or NULL of new ones. */
@@ -223,11 +239,7 @@ collide_status collide_world_allow(collide_world *world, const int32_t *pairs, s
     collide_status status;
     size_t k;
     if (world == NULL) return COLLIDE_INVALID_ARGUMENT;
-    if ((status = check_ids(world, caller, "pairs", pairs, 2 * n)) != COLLIDE_OK) return status;
-    for (k = 0; k < n; k++)
-        if (pairs[2 * k] == pairs[2 * k + 1])
-            return refuse(world->message, COLLIDE_INVALID_ARGUMENT,
-                          "%s: pair %zu is body %ld twice; a body is never tested against itself", caller, k, (long)pairs[2 * k]);
+    if ((status = check_pairs(world, caller, pairs, n)) != COLLIDE_OK) return status;
     if (!reserve_keys(world, 2 * n)) return refuse(world->message, COLLIDE_NO_MEMORY, "%s: out of memory", caller);
     for (k = 0; k < n; k++) {
         int64_t i = row_of_id(world, pairs[2 * k]), j = row_of_id(world, pairs[2 * k + 1]);
@@ -255,6 +267,7 @@ static void close_gaps(collide_world *world)
         memmove(world->traits + TRAITS * n, world->traits + TRAITS * k, TRAITS * sizeof(int64_t));
         world->traits[TRAITS * n + FLAGS] &= STATIC_BIT | STILL_BIT; /* that it has changed is forgotten */
         world->wholes[n] = world->wholes[k];
+        world->margins[n] = world->margins[k];
         world->is_whole[n] = world->is_whole[k];
         world->row_of[n] = world->row_of[k];
         world->is_moved[n] = 0;
@@ -262,8 +275,11 @@ static void close_gaps(collide_world *world)
     }
     for (k = 0; k < world->n_allowed_keys; k++)
         world->allowed_keys[k] = now_at[first_of(world->allowed_keys[k])] << 32 | now_at[second_of(world->allowed_keys[k])];
+    for (k = 0; k < world->n_margin_keys; k++)
+        world->margin_keys[k] = key_of(now_at[first_of(world->margin_keys[k])], now_at[second_of(world->margin_keys[k])]);
     world->n = n;
     world->n_changed = 0;
+    spread_margins(world);
     write_allowed(world);
     make_trees(world);
 }
@@ -297,6 +313,7 @@ static int32_t put_body(collide_world *world, const collide_body *body)
     world->is_whole[row] = world->wholes[row].bound != NULL;
     world->row_of[row] = take_shape(&world->table, world->is_whole[row] ? world->wholes[row].bound : body->shape);
     world->is_alive[row] = world->is_moved[row] = 1;
+    world->margins[row] = world->spread[row] = 0.0;
     world->n_alive++;
     return world->ids[row] = world->next_id++;
 }
@@ -365,6 +382,7 @@ collide_status collide_world_remove(collide_world *world, int32_t id)
         world->n_allowed_keys = n;
         write_allowed(world);
     }
+    forget_margins(world, row);
     take_from_trees(world, row);
     round_as_before(given);
     return COLLIDE_OK;

@@ -79,6 +79,10 @@ struct collide_world {
     /* Pairs never tested: keys both ways round, ascending, and rows of them as kernels read them. */
     int64_t *allowed_keys, *allowed_rows;
     size_t n_allowed_keys, n_allowed, allowed_capacity;
+    /* Margins of bodies [m], and keys of pairs with their own, ascending; what boxes of bodies are widened by, and the most of it. */
+    double *margins, *pair_margins, *spread, widest;
+    int64_t *margin_keys;
+    size_t n_margin_keys, margin_capacity;
     collide_shape *point;
     char message[MESSAGE];
 };
@@ -86,10 +90,10 @@ struct collide_world {
 /* What questions about worlds take beside a workspace: lists that grow, and a block of pairs. */
 struct world_space {
     int64_t *keys, *sorted, *pairs, *counts, *stack, *skipped;
-    double *bounds, *rays, *flat_nodes;
+    double *bounds, *rays, *flat_nodes, *widened;
     int64_t *flat_links; /* of a tree of leaves side by side */
     collide_contact *contacts;
-    size_t n_keys, n_counts, n_contacts, n_flat;
+    size_t n_keys, n_counts, n_contacts, n_flat, n_widened;
     double X_WA[16 * BLOCK], X_WB[16 * BLOCK];
     int64_t which[2 * BLOCK];
     collide_pair rows[BLOCK];
@@ -109,6 +113,20 @@ collide_status refuse_pair(const collide_world *world, collide_workspace *space,
 static inline int64_t key_of(int64_t i, int64_t j) { return i < j ? i << 32 | j : j << 32 | i; }
 static inline int64_t first_of(int64_t key) { return key >> 32; }
 static inline int64_t second_of(int64_t key) { return key & 0xffffffff; }
+
+/* capi_world.c: memory for n items, 0 where there is none; the row of a body, -1 of unknown ids; whether ids, or both ids of
+   pairs, are those of bodies. */
+int resize(void *place, size_t n, size_t bytes);
+int64_t row_of_id(const collide_world *world, int32_t id);
+collide_status check_ids(collide_world *world, const char *caller, const char *what, const int32_t *ids, size_t n);
+collide_status check_pairs(collide_world *world, const char *caller, const int32_t *pairs, size_t n);
+
+/* capi_world_margins.c: a margin [m] and that of a pair, its own or the sum of both bodies'. After a change of margins how far boxes
+   spread; a body that is removed. Boxes with room for margins, of which there are some, and how far to walk for those within a margin. */
+double reach_of_key(const collide_world *world, int64_t key, double margin);
+void spread_margins(collide_world *world);
+void forget_margins(collide_world *world, int64_t body);
+double widen_boxes(const collide_world *world, struct world_space *own, double margin);
 
 /* capi_world_shapes.c: rows of shapes for one more user, with room for it; and one user less. */
 int64_t take_shape(struct shape_rows *table, const collide_shape *shape);

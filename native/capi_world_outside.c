@@ -73,18 +73,29 @@ static void box_around(const collide_world *world, const collide_shape *shape, c
     world->kernels->move_single_parts(address_of(parts), address_of(X_WS), address_of(&is_moved), 0, 0.0, address_of(&body));
 }
 
+/* Whether a box of a body comes within a margin of another one, as `boxes_met` has it. */
+static int are_near(const double *of_body, const double *box, double margin)
+{
+    int axis;
+    for (axis = 0; axis < 3; axis++)
+        if (!(of_body[axis] <= box[axis + 3] + margin && box[axis] - margin <= of_body[axis + 3])) return 0;
+    return 1;
+}
+
 static collide_status rows_of_shape(const collide_world *world, collide_workspace *space, const collide_shape *shape,
                                     const double *X_WS, double limit, collide_pair *rows, size_t capacity, size_t *count)
 {
     struct world_space *own = space->world;
     double box[6];
     size_t n, k;
+    double reach = world->widest > 0.0 ? widen_boxes(world, own, limit) : limit;
     box_around(world, shape, X_WS, box);
-    if (!boxes_met(world, own, box, limit, &n)) return no_memory(space);
+    if (!boxes_met(world, own, box, reach, &n)) return no_memory(space);
     for (k = 0; k < n; k++) {
         int64_t body = own->keys[k];
         collide_pair row;
         collide_status status;
+        if (world->widest > 0.0 && !are_near(own->widened + 6 * body, box, limit)) continue;
         if (world->is_whole[body]) return refuse_body(world, space, "the shape", body, COLLIDE_UNSUPPORTED);
         take_pair(space, shape, shape_of_body(world, body));
         status = row_of_pair(space, X_WS, world->X_WBs + 16 * body, limit, COLLIDE_TRUST_POSES, &row);

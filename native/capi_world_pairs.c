@@ -40,6 +40,10 @@ static int begin_question(const collide_world *world, collide_workspace *space)
     if (own->stack == NULL) own->stack = malloc(16 * (size_t)world->measures[W_STACK_OF_PAIRS]);
     if (own->rays == NULL) own->rays = calloc((size_t)(world->measures[W_RAY_DOUBLES] + world->measures[W_RAY_INTEGERS]), 8);
     if (own->stack == NULL || own->rays == NULL || !fit_keys(own, 64 + 4 * world->n)) return 0;
+    if (world->widest > 0.0 && own->n_widened < world->n) {
+        if (more_of((int64_t **)(void *)&own->widened, 12 * world->n) == NULL) return 0;
+        own->n_widened = 2 * world->n;
+    }
     if (world->n < own->n_counts) return 1;
     if (more_of(&own->counts, 2 * world->n + 2) == NULL || more_of(&own->skipped, 2 * world->n + 2) == NULL) return 0;
     own->n_counts = 2 * world->n + 2;
@@ -54,6 +58,7 @@ void free_world_space(struct world_space *own)
     free(own->pairs);
     free(own->bounds);
     free(own->counts);
+    free(own->widened);
     free(own->skipped);
     free(own->stack);
     free(own->rays);
@@ -98,18 +103,31 @@ static int add_unbounded(const collide_world *world, struct world_space *own, co
     return 1;
 }
 
-/* Keys of all pairs that are to be tested, boxes within a margin, ascending; *n : how many. 0 where there is no memory. */
+/* Of n keys those whose boxes, with room for margins, come within a margin. */
+static size_t pairs_widened(const collide_world *world, struct world_space *own, int64_t *tree, double margin, size_t n)
+{
+    int64_t *met = own->pairs, k;
+    tree[T_BOXES_AT] = address_of(own->widened);
+    n = (size_t)world->kernels->tested_pairs(address_of(tree), address_of(own->keys), (int64_t)n, margin, 1, address_of(met));
+    for (k = 0; k < (int64_t)n; k++) own->keys[k] = key_of(met[2 * k], met[2 * k + 1]);
+    return n;
+}
+
+/* Keys of all pairs that are to be tested, boxes within a margin and those of bodies, ascending; *n : how many. 0 where there is no
+   memory. */
 static int near_pairs(const collide_world *world, struct world_space *own, double margin, size_t *n)
 {
     int64_t tree[TREE_HEADER], count;
+    double reach = world->widest > 0.0 ? widen_boxes(world, own, margin) : margin;
     size_t k;
     tree_header(world, tree);
-    while ((count = world->kernels->pairs_of_all(address_of(tree), margin, 0, address_of(own->stack), address_of(own->keys),
+    while ((count = world->kernels->pairs_of_all(address_of(tree), reach, 0, address_of(own->stack), address_of(own->keys),
                                                  (int64_t)own->n_keys)) > (int64_t)own->n_keys)
         if (!fit_keys(own, (size_t)count)) return 0;
     *n = (size_t)count;
     for (k = 0; k < world->n_unbounded; k++)
-        if (!add_unbounded(world, own, tree, world->unbounded[k], margin, n)) return 0;
+        if (!add_unbounded(world, own, tree, world->unbounded[k], reach, n)) return 0;
+    if (world->widest > 0.0) *n = pairs_widened(world, own, tree, margin, *n);
     sort_keys(own, *n, world->n);
     return 1;
 }
@@ -171,39 +189,89 @@ collide_status check_question(const collide_world *world, collide_workspace *spa
     return begin_question(world, space) ? COLLIDE_OK : no_memory(space);
 }
 
-/* How many of n keys, BLOCK at most, are of convex shapes before the first that is not. */
-static size_t n_convex(const collide_world *world, const int64_t *keys, size_t n)
+/* What is asked about pairs: booleans or rows, up to a limit [m], to which the margins of pairs are added or not. */
+struct asked_pairs {
+    int boolean, with_margins;
+    double limit;
+};
+
+static double reach_of(const collide_world *world, const struct asked_pairs *asked, int64_t key)
+{
+    return asked->with_margins ? reach_of_key(world, key, asked->limit) : asked->limit;
+}
+
+/* How many of n keys, BLOCK at most, are of convex shapes and have the reach of the first, before others. */
+static size_t n_of_reach(const collide_world *world, const struct asked_pairs *asked, const int64_t *keys, size_t n, double reach)
 {
     size_t k = 0;
-    while (k < n && k < BLOCK && !is_whole_key(world, keys[k])) k++;
+    while (k < n && k < BLOCK && !is_whole_key(world, keys[k]) && reach_of(world, asked, keys[k]) == reach) k++;
     return k;
 }
 
-/* Answer the first of n keys, into own->hits or own->rows; *some : how many. */
-static collide_status answer_some(const collide_world *world, collide_workspace *space, const int64_t *keys, size_t n, int boolean,
-                                  double limit, size_t *some)
+/* Whether a pair that is no more than a reach above 0 apart, from its row. */
+static collide_status comes_within(const collide_world *world, collide_workspace *space, int64_t key, double reach,
+                                   const collide_pair *row, uint8_t *hit)
+{
+    int64_t a = first_of(key), b = second_of(key);
+    collide_status status;
+    *hit = row->hit || row->lower <= reach;
+    if (is_whole_key(world, key)) return COLLIDE_OK;
+    status = within_by_row(space, shape_of_body(world, a), shape_of_body(world, b), world->X_WBs + 16 * a, world->X_WBs + 16 * b, reach,
+                           COLLIDE_TRUST_POSES, row, hit);
+    return status == COLLIDE_OK ? status : refuse_pair(world, space, key, status);
+}
+
+/* A pair with a mesh or a field, into own->hits or own->rows. */
+static collide_status answer_whole(const collide_world *world, collide_workspace *space, int64_t key, int boolean, double reach)
 {
     struct world_space *own = space->world;
-    if ((*some = n_convex(world, keys, n)) > 0) return answer_keys(world, space, keys, *some, NULL, boolean, limit);
-    *some = 1;
-    return boolean ? whole_meets(world, space, keys[0], own->hits) : row_of_whole(world, space, keys[0], limit, own->rows);
+    collide_status status = boolean ? whole_meets(world, space, key, own->hits) : COLLIDE_OK;
+    if (status != COLLIDE_OK || (boolean && (own->hits[0] || reach == 0.0))) return status;
+    return row_of_whole(world, space, key, reach, own->rows);
+}
+
+/* Answer the first of n keys, into own->rows unless booleans are asked; own->hits : whether they meet, or come within their reach
+   where margins count; *some : how many. */
+static collide_status answer_some(const collide_world *world, collide_workspace *space, const struct asked_pairs *asked,
+                                  const int64_t *keys, size_t n, size_t *some)
+{
+    struct world_space *own = space->world;
+    double reach = reach_of(world, asked, keys[0]);
+    int rows = !asked->boolean || reach > 0.0, is_met;
+    collide_status status;
+    size_t k;
+    if ((*some = n_of_reach(world, asked, keys, n, reach)) > 0) status = answer_keys(world, space, keys, *some, NULL, !rows, reach);
+    else {
+        *some = 1;
+        own->hits[0] = 0;
+        status = answer_whole(world, space, keys[0], asked->boolean, reach);
+    }
+    is_met = asked->boolean && is_whole_key(world, keys[0]) && own->hits[0];
+    if (status != COLLIDE_OK || !rows || is_met) return status;
+    for (k = 0; k < *some && status == COLLIDE_OK; k++) {
+        if (asked->with_margins && reach > 0.0) status = comes_within(world, space, keys[k], reach, own->rows + k, own->hits + k);
+        else own->hits[k] = own->rows[k].hit;
+    }
+    return status;
 }
 
 /* Whether one of n keys hits: those of convex shapes first, and of the others any, whatever is not answered. */
-static collide_status any_hit(const collide_world *world, collide_workspace *space, const int64_t *keys, size_t n, int *hit)
+static collide_status any_hit(const collide_world *world, collide_workspace *space, const struct asked_pairs *asked,
+                              const int64_t *keys, size_t n, int *hit)
 {
     collide_status status = COLLIDE_OK, first = COLLIDE_OK;
     size_t k, j, some;
     for (k = 0; k < n && !*hit && status == COLLIDE_OK; k += some) {
-        if ((some = n_convex(world, keys + k, n - k)) == 0) some = 1;
-        else status = answer_keys(world, space, keys + k, some, NULL, 1, 0.0);
-        for (j = 0; j < some && status == COLLIDE_OK && !is_whole_key(world, keys[k]); j++) *hit |= space->world->hits[j];
+        some = 1;
+        if (is_whole_key(world, keys[k])) continue;
+        status = answer_some(world, space, asked, keys + k, n - k, &some);
+        for (j = 0; j < some && status == COLLIDE_OK; j++) *hit |= space->world->hits[j];
     }
     for (k = 0; k < n && !*hit && status == COLLIDE_OK; k++) {
         char message[MESSAGE];
         if (!is_whole_key(world, keys[k])) continue;
         memcpy(message, space->message, sizeof message);
-        status = whole_meets(world, space, keys[k], space->world->hits);
+        status = answer_some(world, space, asked, keys + k, 1, &some);
         if (status == COLLIDE_OK) *hit = space->world->hits[0];
         if (status != COLLIDE_UNSUPPORTED) continue;
         if (first != COLLIDE_OK) memcpy(space->message, message, sizeof message); /* the first that is not answered is named */
@@ -214,32 +282,44 @@ static collide_status any_hit(const collide_world *world, collide_workspace *spa
     return status != COLLIDE_OK ? status : *hit ? COLLIDE_OK : first;
 }
 
-static collide_status collides(const collide_world *world, collide_workspace *space, int *hit)
+static collide_status collides(const collide_world *world, collide_workspace *space, double margin, int *hit)
 {
+    const struct asked_pairs asked = {1, 1, margin};
     struct world_space *own = space->world;
     collide_status status = COLLIDE_OK;
     size_t n;
-    if (world->n >= MIN_SCANNED) {
+    if (world->n >= MIN_SCANNED && world->widest == 0.0 && margin == 0.0) {
         int64_t tree[TREE_HEADER], keys[FIRST_PAIRS];
         tree_header(world, tree);
         n = (size_t)world->kernels->first_pairs(address_of(tree), SCANNED, address_of(keys), FIRST_PAIRS);
-        status = any_hit(world, space, keys, n, hit);
+        status = any_hit(world, space, &asked, keys, n, hit);
         if (*hit || status != COLLIDE_OK) return status;
     }
-    if (!near_pairs(world, own, 0.0, &n)) return no_memory(space);
-    return any_hit(world, space, own->keys, n, hit);
+    if (!near_pairs(world, own, margin, &n)) return no_memory(space);
+    return any_hit(world, space, &asked, own->keys, n, hit);
 }
 
-collide_status collide_world_collides(const collide_world *world, collide_workspace *workspace, int *hit)
+static collide_status ask_collides(const collide_world *world, collide_workspace *space, const char *caller, double margin, int *hit)
 {
-    collide_status status = check_question(world, workspace, "collide_world_collides", hit != NULL, "hit is NULL");
+    int is_good = hit != NULL && (margin == 0.0 || (margin >= SMALLEST && margin <= LARGEST));
+    collide_status status = check_question(world, space, caller, is_good, "hit is NULL, or margin is neither 0 nor within 1e-50 ... 1e50");
     rounding given;
     if (hit != NULL) *hit = 0;
     if (status != COLLIDE_OK) return status;
     given = round_as_kernels_do();
-    status = collides(world, workspace, hit);
+    status = collides(world, space, margin, hit);
     round_as_before(given);
     return status;
+}
+
+collide_status collide_world_collides(const collide_world *world, collide_workspace *workspace, int *hit)
+{
+    return ask_collides(world, workspace, "collide_world_collides", 0.0, hit);
+}
+
+collide_status collide_world_within(const collide_world *world, collide_workspace *workspace, double margin, int *hit)
+{
+    return ask_collides(world, workspace, "collide_world_within", margin, hit);
 }
 
 collide_status too_many(collide_workspace *space, size_t count, size_t capacity)
@@ -248,16 +328,17 @@ collide_status too_many(collide_workspace *space, size_t count, size_t capacity)
     return refuse(space->message, COLLIDE_TOO_MANY, "there are %zu, and room for %zu", count, capacity);
 }
 
-/* The ids of all tested pairs that hit, two a pair. */
+/* The ids of all tested pairs that hit, or come within their margins, two a pair. */
 static collide_status pairs_that_hit(const collide_world *world, collide_workspace *space, int32_t *ids, size_t capacity,
                                      size_t *count)
 {
+    const struct asked_pairs asked = {1, 1, 0.0};
     struct world_space *own = space->world;
     collide_status status = COLLIDE_OK;
     size_t n, first, k, some;
     if (!near_pairs(world, own, 0.0, &n)) return no_memory(space);
     for (first = 0; first < n && status == COLLIDE_OK; first += some) {
-        status = answer_some(world, space, own->keys + first, n - first, 1, 0.0, &some);
+        status = answer_some(world, space, &asked, own->keys + first, n - first, &some);
         for (k = 0; k < some && status == COLLIDE_OK; k++) {
             if (!own->hits[k]) continue;
             if (*count < capacity) {
@@ -284,18 +365,19 @@ collide_status collide_world_hits(const collide_world *world, collide_workspace 
     return status;
 }
 
-/* Rows of all tested pairs within a limit, those that hit alone or all that are not proven to be farther. */
+/* Rows of all tested pairs within a limit: those that hit or come within their margins, or all that are not proven to be farther. */
 static collide_status rows_within(const collide_world *world, collide_workspace *space, double limit, int hits_alone,
                                   collide_pair *rows, size_t capacity, size_t *count)
 {
+    const struct asked_pairs asked = {0, hits_alone, limit};
     struct world_space *own = space->world;
     collide_status status = COLLIDE_OK;
     size_t n, first, k, some;
     if (!near_pairs(world, own, limit, &n)) return no_memory(space);
     for (first = 0; first < n && status == COLLIDE_OK; first += some) {
-        status = answer_some(world, space, own->keys + first, n - first, 0, limit, &some);
+        status = answer_some(world, space, &asked, own->keys + first, n - first, &some);
         for (k = 0; k < some && status == COLLIDE_OK; k++) {
-            if (hits_alone ? !own->rows[k].hit : own->rows[k].lower > limit) continue;
+            if (hits_alone ? !own->hits[k] : own->rows[k].lower > limit) continue;
             if (*count < capacity) rows[*count] = own->rows[k];
             ++*count;
         }
@@ -477,7 +559,7 @@ collide_status collide_world_contacts(const collide_world *world, collide_worksp
     given = round_as_kernels_do();
     if (!near_pairs(world, own, margin, &n)) status = no_memory(workspace);
     for (k = 0; k < n && status == COLLIDE_OK; k++) {
-        status = contacts_of_key(world, workspace, own->keys[k], margin, max_contacts, &some);
+        status = contacts_of_key(world, workspace, own->keys[k], reach_of_key(world, own->keys[k], margin), max_contacts, &some);
         if (status != COLLIDE_OK) refuse_pair(world, workspace, own->keys[k], status);
         for (j = 0; j < some && status == COLLIDE_OK; j++, ++*count) {
             own->contacts[j].a = world->ids[first_of(own->keys[k])];

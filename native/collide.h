@@ -615,6 +615,14 @@ COLLIDE_API collide_status collide_world_sleep(collide_world *world, const int32
 /* Never test n pairs of bodies, two ids each. O(pairs allowed so far) a call: hand over many at once. */
 COLLIDE_API collide_status collide_world_allow(collide_world *world, const int32_t *pairs, size_t n);
 
+/* Margins [m] of n bodies, 0 or within 1e-50 ... 1e50: a tested pair no farther apart than both margins together counts as a hit for
+   `collides` and `hits`, is a row of `collisions`, and has its contacts told. Distances are told unchanged. O(bodies) a call: hand
+   over many at once; boxes near each other are looked for within the widest of all margins. */
+COLLIDE_API collide_status collide_world_set_margins(collide_world *world, const int32_t *ids, size_t n, const double *margins);
+
+/* Margins of n pairs of bodies, two ids each, instead of the sum of both bodies'; margins NULL: the pairs lose theirs. */
+COLLIDE_API collide_status collide_world_set_pair_margins(collide_world *world, const int32_t *pairs, size_t n, const double *margins);
+
 /* How many bodies there are. */
 COLLIDE_API size_t collide_world_size(const collide_world *world);
 
@@ -624,11 +632,15 @@ COLLIDE_API collide_status collide_world_pose(const collide_world *world, int32_
 /* Whether any tested pair hits; stops at the first hit. COLLIDE_UNSUPPORTED: no pair that is answered does, and one is not. */
 COLLIDE_API collide_status collide_world_collides(const collide_world *world, collide_workspace *workspace, int *hit);
 
-/* Every tested pair that hits, by booleans alone: two ids a pair, sorted. capacity : of pairs. */
+/* Whether any tested pair is at most a margin apart [m], 0 or within 1e-50 ... 1e50, to which the margins of bodies and pairs are
+   added; decided as by `collide_within`. */
+COLLIDE_API collide_status collide_world_within(const collide_world *world, collide_workspace *workspace, double margin, int *hit);
+
+/* Every tested pair that hits, or comes within its margin, by booleans alone: two ids a pair, sorted. capacity : of pairs. */
 COLLIDE_API collide_status collide_world_hits(const collide_world *world, collide_workspace *workspace, int32_t *ids,
                                               size_t capacity, size_t *count);
 
-/* Every tested pair that hits, with its depth: rows sorted by (a, b), the ids of the bodies, a < b. Of two half-spaces that
+/* Every tested pair that hits, with its depth, or comes within its margin (`hit` is 0 where it is apart): rows sorted by (a, b), the ids of the bodies, a < b. Of two half-spaces that
    overlap the distance is minus infinity. */
 COLLIDE_API collide_status collide_world_collisions(const collide_world *world, collide_workspace *workspace, collide_pair *rows,
                                                     size_t capacity, size_t *count);
@@ -643,7 +655,7 @@ COLLIDE_API collide_status collide_world_distances(const collide_world *world, c
 COLLIDE_API collide_status collide_world_minimum(const collide_world *world, collide_workspace *workspace, double max_distance,
                                                  collide_pair *row, size_t *count);
 
-/* Contacts of every tested pair within a margin >= 0 [m], at most max_contacts >= 1 a pair, sorted by (a, b), the ids of the
+/* Contacts of every tested pair within a margin >= 0 [m] and its own, at most max_contacts >= 1 a pair, sorted by (a, b), the ids of the
    bodies; as `collide_contacts`. */
 COLLIDE_API collide_status collide_world_contacts(const collide_world *world, collide_workspace *workspace, double margin,
                                                   size_t max_contacts, collide_contact *contacts, size_t capacity, size_t *count);

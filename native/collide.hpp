@@ -600,6 +600,18 @@ public:
     // pairs : two ids each, never tested from now on.
     void allow(Span<const std::int32_t> pairs) { changed(collide_world_allow(get(), pairs.data(), rows(pairs, 2))); }
 
+    // Margins [m] of bodies: pairs so near count as hits.
+    void set_margins(Span<const std::int32_t> ids, Span<const double> margins) {
+        if (ids.size() != margins.size()) throw Error(COLLIDE_INVALID_ARGUMENT);
+        changed(collide_world_set_margins(get(), ids.data(), ids.size(), margins.data()));
+    }
+    void set_margin(std::int32_t id, double margin) { changed(collide_world_set_margins(get(), &id, 1, &margin)); }
+    // A margin of a pair, instead of the sum of both bodies'; nullopt: the pair loses it.
+    void set_pair_margin(std::int32_t a, std::int32_t b, std::optional<double> margin) {
+        const std::int32_t pair[2] = {a, b};
+        changed(collide_world_set_pair_margins(get(), pair, 1, margin ? &*margin : nullptr));
+    }
+
     std::size_t size() const { return collide_world_size(get()); }
     Pose pose(std::int32_t id) const {
         Pose X_WB;
@@ -610,6 +622,12 @@ public:
     bool collides(Workspace &space) const {
         int hit = 0;
         told(space, collide_world_collides(get(), space.get(), &hit));
+        return hit != 0;
+    }
+    // Whether any pair is at most a margin apart, or the sum of it and its own.
+    bool within(Workspace &space, double margin) const {
+        int hit = 0;
+        told(space, collide_world_within(get(), space.get(), margin, &hit));
         return hit != 0;
     }
     // Pairs that hit: two ids each.

@@ -91,6 +91,17 @@ class CWorld:
         pairs = np.ascontiguousarray(pairs, dtype=np.int32).reshape(-1, 2)
         return self._library.collide_world_allow(self.handle, pairs.ctypes.data, len(pairs))
 
+    def set_margins(self, ids, margins) -> int:
+        ids, margins = np.ascontiguousarray(ids, dtype=np.int32), np.ascontiguousarray(margins, dtype=np.float64)
+        return self._library.collide_world_set_margins(self.handle, ids.ctypes.data, len(ids), margins.ctypes.data)
+
+    def set_pair_margins(self, pairs, margins) -> int:
+        """margins : ``None`` takes them away."""
+        pairs = np.ascontiguousarray(pairs, dtype=np.int32).reshape(-1, 2)
+        margins = None if margins is None else np.ascontiguousarray(margins, dtype=np.float64)
+        at = None if margins is None else margins.ctypes.data
+        return self._library.collide_world_set_pair_margins(self.handle, pairs.ctypes.data, len(pairs), at)
+
     def pose(self, identity: int) -> tuple[int, np.ndarray]:
         X = np.zeros((4, 4))
         return self._library.collide_world_pose(self.handle, identity, X.ctypes.data), X
@@ -100,6 +111,10 @@ class CWorld:
     def collides(self, asker: c.Asker | None = None) -> tuple[int, bool]:
         hit = c_int(7)
         return self._library.collide_world_collides(self.handle, self._of(asker), hit), bool(hit.value)
+
+    def within(self, margin: float, asker: c.Asker | None = None) -> tuple[int, bool]:
+        hit = c_int(7)
+        return self._library.collide_world_within(self.handle, self._of(asker), margin, hit), bool(hit.value)
 
     def collisions(self, asker: c.Asker | None = None, capacity: int | None = None):
         return self._rows(self._library.collide_world_collisions, PAIR_DTYPE, capacity, self._of(asker))

@@ -36,8 +36,9 @@ class Both:
     wrong : what was answered differently.   n : questions by sort.   hits, rows : pairs that hit, and pairs told of.
     """
 
-    def __init__(self, seed: int, tally: collections.Counter):
+    def __init__(self, seed: int, tally: collections.Counter, with_margins: bool = False):
         self.random, self.seed, self.step = np.random.default_rng([91, seed]), seed, 0
+        self.with_margins = with_margins
         self.python, self.own = collide.World(), CWorld()
         self.ids: list[int] = []
         self.made: dict[int, tuple[collide.Shape, c.CShape]] = {}  # holds what is numbered
@@ -80,7 +81,8 @@ class Both:
 
     def change(self) -> None:
         """One of all changes that there are."""
-        what = str(self.random.choice(["add", "remove", "far", "near", "near", "replace", "allow", "sleep"]))
+        kinds = ["add", "remove", "far", "near", "near", "replace", "allow", "sleep"]
+        what = str(self.random.choice(kinds + ["margin", "pair margin"] * self.with_margins))
         self.tally[what] += 1
         if what == "add" or len(self.ids) < 6:
             self.add_pair()
@@ -104,8 +106,32 @@ class Both:
             asleep, bodies = bool(self.random.uniform() < 0.6), self.some(3)
             (self.python.sleep if asleep else self.python.wake)(bodies)
             assert self.own.sleep(bodies, asleep) == c.OK
+        elif what == "margin":
+            bodies, margin = self.some(2), float(self.random.choice([0.0, 1e-50, 1e-6, 0.1, 2.0]))
+            for body in bodies:
+                self.python.set_margin(body, margin)
+            assert self.own.set_margins(bodies, [margin, margin]) == c.OK
+        elif what == "pair margin":
+            self.change_pair_margin()
         else:
             self.move(what)
+
+    def change_pair_margin(self) -> None:
+        """Of the pair of a row: its distance to the last bit, a double less or more, another one, or none any more."""
+        pair, margin = self.some(2), float(self.random.choice([0.0, 0.05, 1.0]))
+        rows = self.python.distances(3.0).rows
+        rows = rows[rows["distance"] > 1e-12]
+        if len(rows) and self.random.uniform() < 0.8:
+            row = rows[int(self.random.integers(len(rows)))]
+            pair, d = [int(row["a"]), int(row["b"])], float(row["distance"])
+            margin = float(self.random.choice([d, d, np.nextafter(d, 0.0), np.nextafter(d, 9e9)]))
+            self.tally["last digit"] += 1
+        if self.random.uniform() < 0.2:
+            self.python.set_margin(pair[0], None, partner=pair[1])
+            assert self.own.set_pair_margins([pair], None) == c.OK
+        else:
+            self.python.set_margin(pair[0], margin, partner=pair[1])
+            assert self.own.set_pair_margins([pair[::-1]], [margin]) == c.OK
 
     def move(self, how: str) -> None:
         """Some bodies: to a pose of another pair, or by a step of 1e-16 … 1."""
@@ -141,8 +167,18 @@ class Both:
         self.compare("hits", np.stack([hitting["a"], hitting["b"]], axis=1), *self.own.hits())
         status, hit = self.own.collides()
         self.compare("collides", np.array([self.python.collides()]), status, np.array([hit]))
+        self.tally["within margins"] += int((~hitting["hit"]).sum())
+        self.ask_within()
         self.ask_contacts(float(self.random.choice([0.0, 1e-3, 1.0])), int(self.random.choice([1, 4, 8, 99])))
         self.ask_from_outside(limit)
+
+    def ask_within(self) -> None:
+        """A margin at random, or the least distance, to the last bit or a double off."""
+        margin, rows = 0.1, self.python.minimum().rows
+        if self.with_margins and len(rows) and 1e-12 < (d := float(rows["distance"][0])) < 1e50:
+            margin = float(self.random.choice([0.0, 1e-6, d, np.nextafter(d, 0.0)]))
+        status, hit = self.own.within(margin)
+        self.compare("within", np.array([self.python.collides(security_margin=margin)]), status, np.array([hit]))
 
     def ask_contacts(self, margin: float, most: int) -> None:
         try:
@@ -227,6 +263,25 @@ def test_random_changes_have_pythons_bits(first):
     few = {what: tally[what] for what, n in least.items() if tally[what] < n}
     assert not few and 0.2 < tally["hit rows"] / tally["rows"] < 0.9, (few, tally)
     assert tally["rays open"] < 0.05 * 12 * tally["rays"], tally
+
+
+@pytest.mark.many(8)
+@pytest.mark.parametrize("first", range(0, 24, 3))
+def test_margins_of_bodies_and_pairs_have_pythons_bits(first):
+    tally, wrong = collections.Counter(), []
+    for seed in range(first, first + 3):
+        both = Both(100 + seed, tally, with_margins=True)
+        for _ in range(5):
+            both.add_pair()
+        for both.step in range(12):
+            for _ in range(int(both.random.integers(2, 6))):
+                both.change()
+            both.ask()
+        wrong += both.wrong
+    assert not wrong, f"{len(wrong)} differ, the first: {wrong[0]}"
+    least = {"margin": 4, "pair margin": 4, "last digit": 3, "within margins": 20, "remove": 3}
+    few = {what: tally[what] for what, n in least.items() if tally[what] < n}
+    assert not few, (few, tally)
 
 
 def test_a_world_in_motion_has_pythons_bits():
@@ -429,6 +484,34 @@ def test_contacts_on_a_terrain_have_pythons_bits():
     assert n_answered >= 8 and n_rows >= 100, (n_answered, n_rows)
 
 
+def test_margins_beside_meshes_and_fields_have_pythons_answers_or_none():
+    """Whether bodies come within their margins, and the rows of those, where nothing overlaps a mesh."""
+    tally = collections.Counter()
+    for number in range(40):
+        random, python, own, held = np.random.default_rng([98, number]), collide.World(), CWorld(), []
+        for _ in range(6):
+            shape, in_c, (group, mask) = drawn_whole(random)
+            X, margin = drawn_pose(random) * [[1, 1, 1, 2.0]], float(random.choice([0.0, 0.2, 1.0]))
+            X[3, 3] = 1.0
+            body = python.add(shape, X, group=group, mask=mask, margin=margin)
+            assert own.add(in_c, X, False, group, mask) == (c.OK, body) and own.set_margins([body], [margin]) == c.OK
+            held.append(in_c)
+        for what, wanted, (status, rows) in (
+            ("collisions", python.collisions, own.collisions()), ("contacts", python.contacts, own.contacts()),
+        ):
+            assert status in (c.OK, c.UNSUPPORTED), (number, own.question_message)
+            if status == c.OK:
+                assert rows.tobytes() == wanted().rows.tobytes(), (number, what)
+                tally[what] += len(rows)
+        for margin in (0.0, 0.1):
+            status, hit = own.within(margin)
+            assert status in (c.OK, c.UNSUPPORTED), (number, own.question_message)
+            if status == c.OK:
+                assert hit == python.collides(security_margin=margin), (number, margin)
+                tally[hit] += 1
+    assert tally[True] >= 15 and tally[False] >= 15 and min(tally["collisions"], tally["contacts"]) >= 5, tally
+
+
 def test_questions_that_meshes_are_not_asked_are_refused_by_name():
     """The nearest pair, depths, shapes and points from outside: beside a mesh; far from it they are answered."""
     mesh = soak_pairs.shape("solid", 1.0, np.random.default_rng(98))
@@ -535,6 +618,10 @@ def test_refused_changes_name_what_is_to_blame_and_change_nothing():
         (lambda: own.sleep([0, -1], True), c.INVALID_ARGUMENT, "ids[1]: no body has id -1"),
         (lambda: own.allow([[0, 1], [3, 3]]), c.INVALID_ARGUMENT, "pair 1 is body 3 twice"),
         (lambda: own.allow([[0, 2]]), c.INVALID_ARGUMENT, "pairs[1]: no body has id 2"),
+        (lambda: own.set_margins([0, 2], [1.0, 1.0]), c.INVALID_ARGUMENT, "ids[1]: no body has id 2"),
+        (lambda: own.set_margins([0, 1], [1.0, -1.0]), c.INVALID_ARGUMENT, "margins[1] is -1; it must be 0 or within"),
+        (lambda: own.set_pair_margins([[0, 1], [1, 1]], None), c.INVALID_ARGUMENT, "pair 1 is body 1 twice"),
+        (lambda: own.set_pair_margins([[0, 1]], [math.nan]), c.INVALID_ARGUMENT, "margins[0] is nan"),
     ):
         assert status() == wanted and text in own.message, (text, own.message)
     assert own.collisions()[1].tobytes() == before and len(own) == 3
@@ -553,6 +640,7 @@ def test_refused_questions_name_what_is_to_blame():
         (lambda: ask(None, asker.handle, None, 0, count), c.INVALID_ARGUMENT, "world is NULL"),
         (lambda: own.distances(-1.0)[0], c.INVALID_ARGUMENT, "max_distance is below 0"),
         (lambda: own.distances(math.nan)[0], c.INVALID_ARGUMENT, "max_distance is below 0"),
+        (lambda: own.within(1e-60)[0], c.INVALID_ARGUMENT, "collide_world_within: hit is NULL, or margin is neither 0"),
         (lambda: own.contacts(math.inf)[0], c.INVALID_ARGUMENT, "margin is outside"),
         (lambda: own.contacts(0.0, 0)[0], c.INVALID_ARGUMENT, "max_contacts is 0"),
         (lambda: own.query(ball, np.diag([1.0, 1, -1, 1]))[0], c.INVALID_POSE, "X_WS is no pose"),

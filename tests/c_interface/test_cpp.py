@@ -263,6 +263,11 @@ int main() {
     for (const auto &row : world.nearest(space, origins)) say("nearest", row.body, row.distance);
     world.allow(std::vector<std::int32_t>{floor, top});
     say("allowed", world.collides(space));
+    world.set_margins(std::vector<std::int32_t>{floor, last}, std::vector<double>{0.01, 10.0});
+    world.set_pair_margin(top, last, 0.0);
+    world.set_margin(top, 0.5);
+    distances("margins", world.collisions(space));
+    say("within", world.within(space, 0.0), world.within(space, 10.0));
     try {
         world.move(99, here);
     } catch (const Error &error) {
@@ -334,6 +339,12 @@ def _of_world(block, ball, rod, mesh, up, origins, ways) -> list[str]:
         lines += _said(what, [-1 if name is None else int(name) for name in found.names], found["distance"])
     world.allow("0", "1")
     lines += _said("allowed", world.collides())
+    world.set_margin("0", 0.01)
+    world.set_margin("3", 10.0)
+    world.set_margin("1", 0.0, partner="3")
+    world.set_margin("1", 0.5)
+    lines += _pairs("margins", world.collisions())
+    lines += _said("within", world.collides(), world.collides(security_margin=10.0))
     refused = "collide_world_move: ids[0]: no body has id 99; it may have been removed"
     return [*lines, f"collide: an argument is NULL or outside its range: {refused}"]
 
