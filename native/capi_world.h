@@ -165,6 +165,9 @@ collide_status answer_keys(const collide_world *world, collide_workspace *space,
 collide_status make_whole(const collide_mesh *mesh, const collide_field *field, struct whole_body *whole);
 collide_status whole_meets(const collide_world *world, collide_workspace *space, int64_t key, uint8_t *hit);
 collide_status row_of_whole(const collide_world *world, collide_workspace *space, int64_t key, double limit, collide_pair *row);
+/* The row of a shape from outside and a body that is a mesh or a field. */
+collide_status row_from_outside(const collide_world *world, collide_workspace *space, const collide_shape *shape, const double *X_WS,
+                                int64_t body, double limit, collide_pair *row);
 /* Contacts of such a pair of meshes, or of a mesh and a polytope or a ball; COLLIDE_TOO_MANY where `capacity` may not do. */
 collide_status contacts_of_whole(const collide_world *world, collide_workspace *space, int64_t key, double margin,
                                  size_t max_contacts, collide_contact *rows, size_t capacity, size_t *n);

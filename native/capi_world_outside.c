@@ -96,9 +96,11 @@ static collide_status rows_of_shape(const collide_world *world, collide_workspac
         collide_pair row;
         collide_status status;
         if (world->widest > 0.0 && !are_near(own->widened + 6 * body, box, limit)) continue;
-        if (world->is_whole[body]) return refuse_body(world, space, "the shape", body, COLLIDE_UNSUPPORTED);
-        take_pair(space, shape, shape_of_body(world, body));
-        status = row_of_pair(space, X_WS, world->X_WBs + 16 * body, limit, COLLIDE_TRUST_POSES, &row);
+        if (world->is_whole[body]) status = row_from_outside(world, space, shape, X_WS, body, limit, &row);
+        else {
+            take_pair(space, shape, shape_of_body(world, body));
+            status = row_of_pair(space, X_WS, world->X_WBs + 16 * body, limit, COLLIDE_TRUST_POSES, &row);
+        }
         if (status != COLLIDE_OK && status != COLLIDE_ENDLESS_DEPTH)
             return refuse_body(world, space, "the shape", body, status);
         if (row.lower > limit) continue;
@@ -287,15 +289,19 @@ static collide_status nearest_of_keys(const collide_world *world, collide_worksp
     struct world_space *own = space->world;
     double X_WP[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, lower = INFINITE, upper = INFINITE;
     collide_world_hit nothing = *hit;
-    size_t first, k;
+    size_t first, k, some;
     for (k = 0; k < 3; k++) X_WP[4 * k + 3] = point[k];
-    for (first = 0; first < n; first += BLOCK) {
-        size_t some = n - first < BLOCK ? n - first : BLOCK;
+    for (first = 0; first < n; first += some) {
         collide_status status;
-        for (k = 0; k < some; k++)
-            if (world->is_whole[own->keys[first + k]])
-                return refuse_body(world, space, "a point", own->keys[first + k], COLLIDE_UNSUPPORTED);
-        status = answer_keys(world, space, own->keys + first, some, X_WP, 0, INFINITE);
+        for (some = 0; some < BLOCK && first + some < n && !world->is_whole[own->keys[first + some]];) some++;
+        if (some > 0) status = answer_keys(world, space, own->keys + first, some, X_WP, 0, INFINITE);
+        else {
+            int64_t body = own->keys[first];
+            status = row_from_outside(world, space, world->point, X_WP, body, INFINITE, own->rows);
+            own->rows[0].b = world->ids[body];
+            some = 1;
+            if (status != COLLIDE_OK) return refuse_body(world, space, "a point", body, status);
+        }
         if (status != COLLIDE_OK) return status;
         for (k = 0; k < some; k++) {
             const collide_pair *row = &own->rows[k];

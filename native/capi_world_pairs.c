@@ -441,7 +441,8 @@ static struct candidate *in_order(const collide_world *world, struct world_space
     world->kernels->gap_bounds(address_of(world->boxes), (int64_t)world->n, address_of(own->pairs), (int64_t)n, BOX_ROUNDING,
                                address_of(own->bounds));
     for (k = 0; k < n; k++) {
-        made[k].bound = own->bounds[k];
+        int is_open = own->bounds[k] <= 0.0 && is_whole_key(world, own->keys[k]); /* boxes bound depths of convex bodies alone */
+        made[k].bound = is_open ? -INFINITE : own->bounds[k];
         made[k].key = own->keys[k];
     }
     if (n > 0) qsort(made, n, sizeof *made, compare_candidates);
@@ -457,13 +458,15 @@ static collide_status look_among(const collide_world *world, collide_workspace *
     size_t first = 0, size = FIRST_ASKED, some, k;
     int64_t keys[BLOCK];
     while (first < n && candidates[first].bound <= (best->distance < limit ? best->distance : limit)) {
+        struct asked_pairs asked = {0, 0, 0.0};
         double twice = 2.0 * best->distance, reach = twice < limit ? twice : limit;
         collide_status status;
         for (some = 0; some < size && first + some < n; some++) {
             keys[some] = candidates[first + some].key;
-            if (is_whole_key(world, keys[some])) return refuse_pair(world, space, keys[some], COLLIDE_UNSUPPORTED);
+            if (is_whole_key(world, keys[some])) break;
         }
-        status = answer_keys(world, space, keys, some, NULL, 0, reach > 0.0 ? reach : 0.0);
+        asked.limit = reach > 0.0 ? reach : 0.0;
+        status = answer_some(world, space, &asked, keys, some > 0 ? some : 1, &some);
         if (status != COLLIDE_OK) return status;
         for (k = 0; k < some; k++) {
             const collide_pair *row = &own->rows[k];
@@ -511,7 +514,9 @@ collide_status collide_world_minimum(const collide_world *world, collide_workspa
     given = round_as_kernels_do();
     status = least_distance(world, workspace, max_distance, &best);
     if (status == COLLIDE_OK && best.key >= 0) {
-        status = answer_keys(world, workspace, &best.key, 1, NULL, 0, INFINITE);
+        const struct asked_pairs asked = {0, 0, INFINITE};
+        size_t some;
+        status = answer_some(world, workspace, &asked, &best.key, 1, &some);
         *row = workspace->world->rows[0];
         *count = status == COLLIDE_OK;
     }

@@ -100,21 +100,38 @@ static collide_pair flipped(const collide_pair *row)
     return out;
 }
 
+static collide_status row_of(collide_workspace *space, const struct whole_pair *pair, double limit, collide_pair *row)
+{
+    const collide_mesh *meshes[2];
+    collide_status status;
+    int f = field_of(pair), m = mesh_of(pair);
+    if (f >= 0)
+        status = collide_field_distance(space, pair->wholes[f]->field, pair->shapes[!f], pair->X[f], pair->X[!f], limit,
+                                        COLLIDE_TRUST_POSES, row);
+    else if (m >= 0)
+        status = collide_mesh_shape_distance(space, pair->wholes[m]->mesh, pair->shapes[!m], pair->X[m], pair->X[!m],
+                                             COLLIDE_TRUST_POSES, row);
+    else if ((status = meshes_of(pair, meshes)) == COLLIDE_OK)
+        status = collide_mesh_distance(space, meshes[0], meshes[1], pair->X[0], pair->X[1], COLLIDE_TRUST_POSES, row);
+    if (f == 1 || m == 1) *row = flipped(row);
+    return status;
+}
+
+collide_status row_from_outside(const collide_world *world, collide_workspace *space, const collide_shape *shape, const double *X_WS,
+                                int64_t body, double limit, collide_pair *row)
+{
+    static const struct whole_body none = {NULL, NULL, NULL};
+    struct whole_pair pair = pair_of_key(world, key_of(body, body));
+    pair.wholes[0] = &none;
+    pair.shapes[0] = shape;
+    pair.X[0] = X_WS;
+    return row_of(space, &pair, limit, row);
+}
+
 collide_status row_of_whole(const collide_world *world, collide_workspace *space, int64_t key, double limit, collide_pair *row)
 {
     struct whole_pair pair = pair_of_key(world, key);
-    const collide_mesh *meshes[2];
-    collide_status status;
-    int f = field_of(&pair), m = mesh_of(&pair);
-    if (f >= 0)
-        status = collide_field_distance(space, pair.wholes[f]->field, pair.shapes[!f], pair.X[f], pair.X[!f], limit,
-                                        COLLIDE_TRUST_POSES, row);
-    else if (m >= 0)
-        status = collide_mesh_shape_distance(space, pair.wholes[m]->mesh, pair.shapes[!m], pair.X[m], pair.X[!m],
-                                             COLLIDE_TRUST_POSES, row);
-    else if ((status = meshes_of(&pair, meshes)) == COLLIDE_OK)
-        status = collide_mesh_distance(space, meshes[0], meshes[1], pair.X[0], pair.X[1], COLLIDE_TRUST_POSES, row);
-    if (f == 1 || m == 1) *row = flipped(row);
+    collide_status status = row_of(space, &pair, limit, row);
     row->a = world->ids[first_of(key)];
     row->b = world->ids[second_of(key)];
     return status == COLLIDE_OK ? status : refuse_pair(world, space, key, status);

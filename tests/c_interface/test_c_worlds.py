@@ -407,7 +407,8 @@ def test_meshes_and_fields_have_pythons_answers_or_none(seed):
         for step in range(6):
             change_wholes(random, python, own, held)
             ask_wholes(python, own, tally, (seed, number, step))
-    few = [what for what in ("hits answered", "pairs", "rows", "hit", "rays hit") if tally[what] < 4]
+    wanted = "hits answered", "pairs", "rows", "hit", "rays hit", "minimum", "query", "nearest"
+    few = [what for what in wanted if tally[what] < 4]
     assert not few and tally["hit"] < tally["hits answered"], (few, tally)
 
 
@@ -444,6 +445,7 @@ def ask_wholes(python: collide.World, own: CWorld, tally: collections.Counter, n
             assert rows.tobytes() == python.distances(limit).rows.tobytes(), (name, limit)
             tally["rows"] += len(rows)
         tally["refused"] += status != c.OK
+    ask_wholes_from_outside(python, own, tally, name)
     directions = np.random.default_rng(len(wanted)).normal(size=(len(python), 3))  # to the middle of every body
     origins = np.stack([python.body(k).X_WB[:3, 3] for k in python.ids]) - directions
     _, rows, statuses = own.raycast(origins, directions)
@@ -451,6 +453,22 @@ def ask_wholes(python: collide.World, own: CWorld, tally: collections.Counter, n
     assert are_equal(python.raycast(origins, directions).rows[answered], rows[answered]), name
     tally["rays"] += int(answered.sum())
     tally["rays hit"] += int(rows["hit"].sum())
+
+
+def ask_wholes_from_outside(python: collide.World, own: CWorld, tally: collections.Counter, name: tuple) -> None:
+    """The nearest pair, shapes and points: at bodies and away from all of them."""
+    ball, scales = collide.Sphere(0.2), np.array([4.0, 4.0, 3.0, 2.0, 2.0, 1.0])
+    points = np.random.default_rng(name).normal(size=(6, 3)) * scales[:, None]
+    asked = [("minimum", python.minimum, own.minimum())]
+    for at in points:
+        X = c.identity_at(*at)
+        asked.append(("query", lambda X=X: python.query(ball, X, 2.0), own.query(c.CShape(ball), X, 2.0)))
+        asked.append(("nearest", lambda at=at: python.nearest(at), own.nearest(at)))
+    for what, wanted, (status, rows) in asked:
+        assert status in (c.OK, c.UNSUPPORTED), (name, own.question_message)
+        if status == c.OK:
+            assert are_equal(wanted().rows, rows), (name, what, wanted().rows, rows)
+            tally[what] += len(rows)
 
 
 def test_contacts_on_a_terrain_have_pythons_bits():
@@ -513,7 +531,7 @@ def test_margins_beside_meshes_and_fields_have_pythons_answers_or_none():
 
 
 def test_questions_that_meshes_are_not_asked_are_refused_by_name():
-    """The nearest pair, depths, shapes and points from outside: beside a mesh; far from it they are answered."""
+    """Depths: of the nearest pair, of shapes and points from outside within a mesh; far from it they are answered."""
     mesh = soak_pairs.shape("solid", 1.0, np.random.default_rng(98))
     own, ball, in_c = CWorld(), c.CShape(collide.Sphere(0.1)), c.CMesh(mesh)
     own.add(in_c, np.eye(4))
