@@ -181,6 +181,10 @@ def close_score(score, at, out_at):
     row.doubles[LOWER] = score[at + _LOWER]
     row.doubles[UPPER] = score[at + _UPPER]
     row.flags[HIT] = 1 if score[at + _HIT] != 0.0 else 0
+    # Rows beyond the limit have no upper bound. Where another row has a finite bound, that row's lower bound may be
+    # within the limit, however far apart the nearest row is by its distance.
+    if score[at + _UPPER] < math.inf:
+        row.flags[BEYOND] = 0
     # Every row that may be the nearest is certified.
     all_certified = score[at + _UNCERTIFIED] == math.inf or score[at + _UNCERTIFIED] > score[at + _UPPER]
     row.flags[CERTIFIED] = 1 if all_certified else 0

@@ -45,7 +45,8 @@ def combined(rows: np.ndarray, numbers) -> tuple[np.ndarray, np.ndarray, bool]:
     assert first_reach_of(score, 5) == math.inf
     for number in numbers:
         add_row(score, 5, address_of(rows[number : number + 1]), number, address_of(out))
-    assert first_reach_of(score, 5) == rows["upper"][numbers[0]]
+    first = rows[numbers[0]]
+    assert first_reach_of(score, 5) == first["lower" if first["beyond"] else "upper"]
     overlap = close_score(score, 5, address_of(out))
     return out[0], score[5:], overlap
 
@@ -76,6 +77,22 @@ def test_one_row_of_many(overlaps):
         seen["certified", bool(row["certified"])] += 1
         seen["full"] += len(deep) == MAX_NORMALS
     assert min(seen["certified", True], seen["certified", False]) > 20 and seen["full"] >= 20 * overlaps, seen
+
+
+@pytest.mark.parametrize("numbers", [(0, 1), (1, 0)])
+@pytest.mark.parametrize("is_open", [False, True])
+def test_bodies_are_beyond_a_limit_where_all_parts_are(numbers, is_open):
+    """A pair of huge parts has an open sign, and a distance greater than that of a pair proven to be beyond."""
+    rows = np.zeros(2, dtype=PAIR_DTYPE)
+    rows["distance"] = rows["lower"] = 5.0, 7.0
+    rows["upper"], rows["beyond"], rows["certified"] = math.inf, True, True
+    if is_open:
+        rows[1]["lower"], rows[1]["upper"] = -1e16, 1e16
+        rows[1]["hit"], rows[1]["beyond"], rows[1]["certified"] = True, False, False
+    row, _, overlap = combined(rows, numbers)
+    assert bool(row["beyond"]) is not is_open and bool(row["hit"]) is is_open and bool(row["certified"]) is not is_open
+    assert row["lower"] <= row["distance"] == 5.0 <= row["upper"] and not overlap
+    assert (row["upper"] == math.inf) is not is_open
 
 
 def test_rows_of_bodies_are_those_of_their_pairs_of_parts_asked_alone():
