@@ -136,7 +136,7 @@ static collide_status cast_once(const struct cast_question *asked, collide_first
 static collide_status begin(struct cast_question *asked, collide_workspace *space, const collide_shape *A, const collide_shape *B,
                             double max_distance, unsigned flags)
 {
-    if (space == NULL || A == NULL || B == NULL || !(max_distance >= 0.0) || (flags & ~CAST_FLAGS) != 0)
+    if (!IS_HANDLE(space, WORKSPACE_WORD) || !IS_HANDLE(A, SHAPE_WORD) || !IS_HANDLE(B, SHAPE_WORD) || !(max_distance >= 0.0) || (flags & ~CAST_FLAGS) != 0)
         return COLLIDE_INVALID_ARGUMENT;
     if (A->ints[KIND] == HALFSPACE) return COLLIDE_UNSUPPORTED;
     if (cast_space_of(space) == NULL) return COLLIDE_NO_MEMORY;

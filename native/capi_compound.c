@@ -67,9 +67,10 @@ collide_status collide_compound_create(const collide_shape *const *shapes, const
     *compound = NULL;
     if (shapes == NULL || poses == NULL || n > (size_t)1 << 24) return COLLIDE_INVALID_ARGUMENT;
     if (n == 0) return COLLIDE_INVALID_SHAPE;
-    for (k = 0; k < n; k++) if (shapes[k] == NULL) return COLLIDE_INVALID_ARGUMENT;
+    for (k = 0; k < n; k++) if (!IS_HANDLE(shapes[k], SHAPE_WORD)) return COLLIDE_INVALID_ARGUMENT;
     if (kernels_here() == NULL) return COLLIDE_NO_KERNELS;
     if ((made = calloc(1, sizeof *made)) == NULL) return COLLIDE_NO_MEMORY;
+    made->word = COMPOUND_WORD;
     made->n = n;
     made->n_groups = groups_of(n);
     made->is_whole = n == 1 && is_identity(poses);
@@ -86,7 +87,8 @@ collide_status collide_compound_create(const collide_shape *const *shapes, const
 
 void collide_compound_free(collide_compound *compound)
 {
-    if (compound == NULL) return;
+    if (!IS_HANDLE(compound, COMPOUND_WORD)) return;
+    end_handle(&compound->word);
     free(compound->held);
     free(compound);
 }

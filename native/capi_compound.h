@@ -21,6 +21,7 @@ enum {
 };
 
 struct collide_compound {
+    int64_t word;
     size_t n, n_groups;
     int64_t serial;               /* no two have the same */
     const collide_shape **shapes; /* of the parts */

@@ -51,7 +51,7 @@ collide_status collide_compound_cast(collide_workspace *workspace, const collide
     double vector[3];
     if (first == NULL) return COLLIDE_INVALID_ARGUMENT;
     begin_contact(first);
-    if (workspace == NULL || A == NULL || B == NULL || X_WA == NULL || X_WB == NULL || direction == NULL || !(max_distance >= 0.0) ||
+    if (!IS_HANDLE(workspace, WORKSPACE_WORD) || !IS_HANDLE(A, COMPOUND_WORD) || !IS_HANDLE(B, COMPOUND_WORD) || X_WA == NULL || X_WB == NULL || direction == NULL || !(max_distance >= 0.0) ||
         (flags & ~(unsigned)COLLIDE_TRUST_POSES) != 0)
         return COLLIDE_INVALID_ARGUMENT;
     if (A->is_whole && B->is_whole)

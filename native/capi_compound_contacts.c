@@ -167,7 +167,7 @@ collide_status collide_compound_contacts(collide_workspace *workspace, const col
     int64_t n;
     if (count == NULL) return COLLIDE_INVALID_ARGUMENT;
     *count = 0;
-    if (workspace == NULL || A == NULL || B == NULL || X_WA == NULL || X_WB == NULL || !(margin >= 0.0 && margin <= LARGEST) ||
+    if (!IS_HANDLE(workspace, WORKSPACE_WORD) || !IS_HANDLE(A, COMPOUND_WORD) || !IS_HANDLE(B, COMPOUND_WORD) || X_WA == NULL || X_WB == NULL || !(margin >= 0.0 && margin <= LARGEST) ||
         max_contacts == 0 || (contacts == NULL && capacity > 0) || (flags & ~(unsigned)COLLIDE_TRUST_POSES) != 0)
         return COLLIDE_INVALID_ARGUMENT;
     if (A->is_whole && B->is_whole) {
@@ -186,7 +186,7 @@ collide_status collide_compound_contacts(collide_workspace *workspace, const col
                      ? COLLIDE_INVALID_POSE : COLLIDE_UNSUPPORTED;
     } else if (status == COLLIDE_OK) {
         *count = (size_t)n;
-        if (*count > 0) memcpy(contacts, workspace->compound_contacts->rows, (*count < capacity ? *count : capacity) * sizeof *contacts);
+        hand_out_contacts(workspace->compound_contacts->rows, *count, contacts, capacity);
         if (*count > capacity) status = COLLIDE_TOO_MANY;
     }
     round_as_before(given);

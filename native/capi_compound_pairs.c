@@ -53,7 +53,7 @@ static collide_status answer(collide_workspace *space, const struct question *as
 static collide_status begin(struct question *asked, collide_workspace *space, const collide_compound *A, const collide_compound *B,
                             collide_poses X_WA, collide_poses X_WB, double limit, unsigned flags, const void *out)
 {
-    if (space == NULL || A == NULL || B == NULL || !(limit >= 0.0) ||
+    if (!IS_HANDLE(space, WORKSPACE_WORD) || !IS_HANDLE(A, COMPOUND_WORD) || !IS_HANDLE(B, COMPOUND_WORD) || !(limit >= 0.0) ||
         (flags & ~(unsigned)(COLLIDE_TRUST_POSES | COLLIDE_UNSIGNED)) != 0)
         return COLLIDE_INVALID_ARGUMENT;
     memset(asked, 0, sizeof *asked);

@@ -48,7 +48,7 @@ static collide_status take_shapes(collide_workspace *space, struct manifold_spac
 static int are_good(const collide_workspace *workspace, struct contact_question *asked)
 {
     if (asked->max_contacts > ALL_CONTACTS) asked->max_contacts = ALL_CONTACTS;
-    return workspace != NULL && asked->margin >= 0.0 && asked->margin <= LARGEST && asked->max_contacts > 0 &&
+    return IS_HANDLE(workspace, WORKSPACE_WORD) && asked->margin >= 0.0 && asked->margin <= LARGEST && asked->max_contacts > 0 &&
            (asked->flags & ~(unsigned)COLLIDE_TRUST_POSES) == 0;
 }
 
@@ -88,7 +88,7 @@ collide_status collide_contacts(collide_workspace *workspace, const collide_shap
 {
     if (count == NULL) return COLLIDE_INVALID_ARGUMENT;
     *count = 0;
-    if (A == NULL || B == NULL || X_WA == NULL || X_WB == NULL || contacts == NULL) return COLLIDE_INVALID_ARGUMENT;
+    if (!IS_HANDLE(A, SHAPE_WORD) || !IS_HANDLE(B, SHAPE_WORD) || X_WA == NULL || X_WB == NULL || contacts == NULL) return COLLIDE_INVALID_ARGUMENT;
     return contacts_of_shapes(workspace, A, B, X_WA, X_WB, margin, max_contacts, flags, contacts, max_contacts, count);
 }
 
@@ -133,7 +133,7 @@ collide_status collide_contacts_batch(collide_workspace *workspace, const collid
     asked.capacity = capacity;
     asked.flags = flags;
     asked.contacts = contacts;
-    if (!are_good(workspace, &asked) || A == NULL || B == NULL) return COLLIDE_INVALID_ARGUMENT;
+    if (!are_good(workspace, &asked) || !IS_HANDLE(A, SHAPE_WORD) || !IS_HANDLE(B, SHAPE_WORD)) return COLLIDE_INVALID_ARGUMENT;
     if (n == 0 && (X_WA.count > 1 || X_WB.count > 1)) return COLLIDE_INVALID_ARGUMENT;
     shapes[0] = A;
     shapes[1] = B;
@@ -153,7 +153,7 @@ collide_status collide_contacts_each(collide_workspace *workspace, const collide
     asked.capacity = capacity;
     asked.flags = flags;
     asked.contacts = contacts;
-    if (!are_good(workspace, &asked) || set == NULL || (n > 0 && which == NULL)) return COLLIDE_INVALID_ARGUMENT;
+    if (!are_good(workspace, &asked) || !IS_HANDLE(set, SET_WORD) || (n > 0 && which == NULL)) return COLLIDE_INVALID_ARGUMENT;
     for (k = 0; k < 2 * n; k++)
         if (which[k] < 0 || (uint64_t)which[k] >= set->count) {
             if (failed != NULL) *failed = k / 2;

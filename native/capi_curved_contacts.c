@@ -110,7 +110,7 @@ collide_status collide_mesh_shape_contacts(collide_workspace *workspace, const c
     int64_t n;
     if (count == NULL) return COLLIDE_INVALID_ARGUMENT;
     *count = 0;
-    if (workspace == NULL || mesh == NULL || shape == NULL || X_WM == NULL || X_WS == NULL || !mesh->given ||
+    if (!IS_HANDLE(workspace, WORKSPACE_WORD) || !IS_HANDLE(mesh, MESH_WORD) || !IS_HANDLE(shape, SHAPE_WORD) || X_WM == NULL || X_WS == NULL || !mesh->given ||
         !(margin >= 0.0 && margin <= LARGEST) || max_contacts == 0 || (contacts == NULL && capacity > 0) ||
         (flags & ~(unsigned)COLLIDE_TRUST_POSES) != 0)
         return COLLIDE_INVALID_ARGUMENT;
@@ -129,7 +129,7 @@ collide_status collide_mesh_shape_contacts(collide_workspace *workspace, const c
         if (n < 0) status = why_mesh_pair(workspace, X_WM, X_WS, flags);
         else {
             *count = (size_t)n;
-            if (*count > 0) memcpy(contacts, space->rows, (*count < capacity ? *count : capacity) * sizeof *contacts);
+            hand_out_contacts(space->rows, *count, contacts, capacity);
             if (*count > capacity) status = COLLIDE_TOO_MANY;
         }
     }

@@ -28,7 +28,8 @@ void measure_field(collide_field *field, const double low[3], const double high[
 
 void collide_field_free(collide_field *field)
 {
-    if (field == NULL) return;
+    if (!IS_HANDLE(field, FIELD_WORD)) return;
+    end_handle(&field->word);
     free(field->radii);
     free(field->held);
     free(field);
@@ -135,6 +136,7 @@ collide_status collide_point_cloud_create(const double *points, size_t n, const 
     for (k = 0; good && k < 3 * n; k++) good = is_coordinate(points[k]);
     if (!good) status = COLLIDE_INVALID_SHAPE;
     else if ((made = calloc(1, sizeof *made)) != NULL) {
+        made->word = FIELD_WORD;
         if (n_radii > 1 && (made->radii = malloc(n * sizeof *radii)) != NULL) memcpy(made->radii, radii, n * sizeof *radii);
         if (n_radii == 1 || made->radii != NULL) status = make_cloud(points, (int64_t)n, largest, made);
         if (status == COLLIDE_OK) *cloud = made;
@@ -152,7 +154,7 @@ collide_status collide_point_cloud_nearest(const collide_field *cloud, const dou
     int64_t stack[POINT_STACK];
     size_t i, j, found;
     rounding given;
-    if (cloud == NULL || cloud->are != BALLS || k == 0 || !(max_distance >= 0.0) || n > MAX_NEAREST / k ||
+    if (!IS_HANDLE(cloud, FIELD_WORD) || cloud->are != BALLS || k == 0 || !(max_distance >= 0.0) || n > MAX_NEAREST / k ||
         (n > 0 && (places == NULL || distances == NULL || rows == NULL)))
         return COLLIDE_INVALID_ARGUMENT;
     found = k < (size_t)cloud->tree[N_FACETS] ? k : (size_t)cloud->tree[N_FACETS];
@@ -208,7 +210,7 @@ collide_status collide_point_cloud_within(const collide_field *cloud, const doub
     int k;
     if (count == NULL) return COLLIDE_INVALID_ARGUMENT;
     *count = 0;
-    if (cloud == NULL || cloud->are != BALLS || place == NULL || !(r >= 0.0 && r < INFINITE) || (rows == NULL && capacity > 0))
+    if (!IS_HANDLE(cloud, FIELD_WORD) || cloud->are != BALLS || place == NULL || !(r >= 0.0 && r < INFINITE) || (rows == NULL && capacity > 0))
         return COLLIDE_INVALID_ARGUMENT;
     if (!is_coordinate(place[0]) || !is_coordinate(place[1]) || !is_coordinate(place[2])) return COLLIDE_INVALID_ARGUMENT;
     kernels = kernels_here();

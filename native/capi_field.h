@@ -19,6 +19,7 @@ enum { ORIGIN = TREE_NUMBERS, SIDES = ORIGIN + 3, FIELD_NUMBERS = SIDES + 3 };
 enum { POINT_STACK = 2 * 8 * 17 };
 
 struct collide_field {
+    int64_t word;
     int64_t tree[FIELD_INTS];
     double numbers[FIELD_NUMBERS];
     int64_t are;            /* BALLS or CELLS */

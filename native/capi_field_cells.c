@@ -155,6 +155,7 @@ collide_status collide_voxel_grid_create(const uint8_t *occupied, const size_t c
     if (occupied == NULL || cells == NULL || cell == NULL) return COLLIDE_INVALID_ARGUMENT;
     if (!is_grid(cells, cell, origin)) return COLLIDE_INVALID_SHAPE;
     if ((made = calloc(1, sizeof *made)) == NULL) return COLLIDE_NO_MEMORY;
+    made->word = FIELD_WORD;
     for (k = 0; k < 3; k++) along[k] = (int64_t)cells[k];
     given = round_as_kernels_do();
     if (place_cells(made, along, cell, origin)) status = build_cells(occupied, along, made);

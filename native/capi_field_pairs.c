@@ -222,7 +222,7 @@ static void go_to(struct field_question *asked, size_t k)
 static collide_status begin(struct field_question *asked, collide_workspace *space, const collide_field *field,
                             const collide_shape *shape, collide_poses X_WF, collide_poses X_WS, unsigned flags)
 {
-    if (space == NULL || field == NULL || shape == NULL || (flags & ~(unsigned)(COLLIDE_TRUST_POSES | COLLIDE_UNSIGNED)) != 0)
+    if (!IS_HANDLE(space, WORKSPACE_WORD) || !IS_HANDLE(field, FIELD_WORD) || !IS_HANDLE(shape, SHAPE_WORD) || (flags & ~(unsigned)(COLLIDE_TRUST_POSES | COLLIDE_UNSIGNED)) != 0)
         return COLLIDE_INVALID_ARGUMENT;
     asked->n = longer(X_WF, X_WS);
     if (asked->n == 0) return X_WF.count > 1 || X_WS.count > 1 ? COLLIDE_INVALID_ARGUMENT : COLLIDE_OK;

@@ -182,7 +182,7 @@ static collide_status answer(const struct motion *asked, collide_time_of_impact 
 static collide_status begin(struct motion *asked, collide_workspace *space, const collide_shape *A, const collide_shape *B,
                             double tolerance, unsigned flags)
 {
-    if (space == NULL || A == NULL || B == NULL || !(tolerance >= LEAST_TOLERANCE && tolerance <= LARGEST_TOLERANCE) ||
+    if (!IS_HANDLE(space, WORKSPACE_WORD) || !IS_HANDLE(A, SHAPE_WORD) || !IS_HANDLE(B, SHAPE_WORD) || !(tolerance >= LEAST_TOLERANCE && tolerance <= LARGEST_TOLERANCE) ||
         (flags & ~(unsigned)COLLIDE_TRUST_POSES) != 0)
         return COLLIDE_INVALID_ARGUMENT;
     if (impact_space_of(space) == NULL) return COLLIDE_NO_MEMORY;

@@ -67,6 +67,22 @@ static inline int64_t address_of(const void *place) { return (int64_t)(intptr_t)
 #define PUT_IF_NULL(place, made) __sync_bool_compare_and_swap((place), NULL, (made))
 #endif
 
+/* As many contacts to the caller as there is room for, who may have none: then contacts is NULL. */
+static inline void hand_out_contacts(const collide_contact *rows, size_t count, collide_contact *contacts, size_t capacity)
+{
+    if (count > capacity) count = capacity;
+    if (count > 0) memcpy(contacts, rows, count * sizeof *rows);
+}
+
+/* The first word of what a handle points to, which loses it when it is freed: by it a freed handle, or one of another type, is
+   refused, for as long as nothing else stands in its memory. */
+enum handle_word {
+    SHAPE_WORD = 0x5afe5001, SET_WORD, COMPOUND_WORD, MESH_WORD, FIELD_WORD, WORLD_WORD, ROBOT_WORD, WORKSPACE_WORD, ROBOT_SPACE_WORD
+};
+#define IS_HANDLE(handle, its_word) ((handle) != NULL && (handle)->word == (its_word))
+/* volatile: a compiler leaves out what is written to memory that is freed next. */
+static inline void end_handle(volatile int64_t *word) { *word = 0; }
+
 /* A kernel's address, as other kernels take it, from where a table holds it. */
 static inline int64_t code_at(const void *function)
 {
@@ -74,14 +90,6 @@ static inline int64_t code_at(const void *function)
     memcpy(&code, function, sizeof(void (*)(void)));
     return code;
 }
-
-/* What threads make at once is made by the first of them. */
-#if defined(_MSC_VER)
-#include <intrin.h>
-#define PUT_IF_NULL(place, made) (_InterlockedCompareExchangePointer((void *volatile *)(place), (made), NULL) == NULL)
-#else
-#define PUT_IF_NULL(place, made) __sync_bool_compare_and_swap((place), NULL, (made))
-#endif
 
 /* --- shapes -------------------------------------------------------------------------------------------------------- */
 
@@ -99,6 +107,7 @@ struct collide_mesh;
 struct world_space;
 
 struct collide_shape {
+    int64_t word;
     int64_t ints[INTS];
     double numbers[NUMBERS];
     int64_t content[2]; /* digest of the numbers: its bytes order the bodies of a pair */
@@ -110,6 +119,7 @@ struct collide_shape {
 };
 
 struct collide_shape_set {
+    int64_t word;
     int64_t *ints;
     double *numbers;
     const collide_shape **shapes;
@@ -136,6 +146,7 @@ int workspace_sizes(const struct collide_kernels *kernels, int64_t measures[MEAS
 void *cache_lines(size_t bytes, void **held);
 
 struct collide_workspace {
+    int64_t word;
     int64_t header[HEADER];
     int64_t ints[2 * INTS]; /* the table of a single pair */
     double numbers[2 * NUMBERS];

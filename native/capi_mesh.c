@@ -128,7 +128,8 @@ static collide_status build_mesh(const struct collide_kernels *kernels, const do
 
 void collide_mesh_free(collide_mesh *mesh)
 {
-    if (mesh == NULL) return;
+    if (!IS_HANDLE(mesh, MESH_WORD)) return;
+    end_handle(&mesh->word);
     collide_shape_free(mesh->hull);
     free_topology(mesh->topology);
     free(mesh->corners);
@@ -210,6 +211,7 @@ collide_status collide_mesh_create(const double *vertices, size_t n, const int32
     if (vertices == NULL || faces == NULL || solid < COLLIDE_SURFACE || solid > COLLIDE_SOLID_IF_CLOSED)
         return COLLIDE_INVALID_ARGUMENT;
     if ((made = calloc(1, sizeof *made)) == NULL) return COLLIDE_NO_MEMORY;
+    made->word = MESH_WORD;
     made->given = 1;
     given = round_as_kernels_do();
     if (are_facets(vertices, n, faces, m)) status = mesh_of_facets(vertices, (int64_t)n, faces, (int64_t)m, solid, made);
@@ -308,9 +310,10 @@ collide_status collide_mesh_of_shape(const collide_shape *shape, collide_mesh **
     rounding given;
     if (mesh == NULL) return COLLIDE_INVALID_ARGUMENT;
     *mesh = NULL;
-    if (shape == NULL) return COLLIDE_INVALID_ARGUMENT;
+    if (!IS_HANDLE(shape, SHAPE_WORD)) return COLLIDE_INVALID_ARGUMENT;
     if (shape->ints[KIND] != POINTS || shape->numbers[SLOP] != 0.0) return COLLIDE_UNSUPPORTED;
     if ((made = calloc(1, sizeof *made)) == NULL) return COLLIDE_NO_MEMORY;
+    made->word = MESH_WORD;
     given = round_as_kernels_do();
     status = mesh_of_hull(shape, made);
     round_as_before(given);

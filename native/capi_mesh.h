@@ -9,6 +9,7 @@ struct facet_topology;
 
 /* Facets under a box-tree, the points of which one lies in every part, and a ball swept over all. */
 struct collide_mesh {
+    int64_t word;
     int64_t tree[10];   /* the tree's header */
     double numbers[7];  /* the tree's numbers */
     int64_t content[2]; /* digest of the facets */

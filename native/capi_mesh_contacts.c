@@ -146,7 +146,7 @@ collide_status collide_mesh_contacts(collide_workspace *workspace, const collide
         if (n < 0) status = why_mesh_pair(workspace, X_WA, X_WB, flags);
         else {
             *count = (size_t)n;
-            if (*count > 0) memcpy(contacts, space->rows, (*count < capacity ? *count : capacity) * sizeof *contacts);
+            hand_out_contacts(space->rows, *count, contacts, capacity);
             if (*count > capacity) status = COLLIDE_TOO_MANY;
         }
     }

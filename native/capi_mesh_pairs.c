@@ -95,7 +95,7 @@ collide_status why_mesh_pair(collide_workspace *space, const double *X_WA, const
 collide_status check_mesh_pair(const collide_workspace *space, const collide_mesh *A, const collide_mesh *B, const double *X_WA,
                                  const double *X_WB, unsigned flags)
 {
-    if (space == NULL || A == NULL || B == NULL || X_WA == NULL || X_WB == NULL || !(A->given || B->given) ||
+    if (!IS_HANDLE(space, WORKSPACE_WORD) || !IS_HANDLE(A, MESH_WORD) || !IS_HANDLE(B, MESH_WORD) || X_WA == NULL || X_WB == NULL || !(A->given || B->given) ||
         (flags & ~(unsigned)(COLLIDE_TRUST_POSES | COLLIDE_UNSIGNED)) != 0)
         return COLLIDE_INVALID_ARGUMENT;
     if ((A->solid && B->n_points > MAX_POINTS) || (B->solid && A->n_points > MAX_POINTS)) return COLLIDE_UNSUPPORTED;

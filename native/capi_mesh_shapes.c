@@ -94,7 +94,7 @@ enum { BY_FACETS, BY_HULL, BY_WALK };
 static collide_status begin(collide_workspace *space, const collide_mesh *mesh, const collide_shape *shape, const double *X_WM,
                             const double *X_WS, unsigned flags, int *how)
 {
-    if (space == NULL || mesh == NULL || shape == NULL || X_WM == NULL || X_WS == NULL || !mesh->given ||
+    if (!IS_HANDLE(space, WORKSPACE_WORD) || !IS_HANDLE(mesh, MESH_WORD) || !IS_HANDLE(shape, SHAPE_WORD) || X_WM == NULL || X_WS == NULL || !mesh->given ||
         (flags & ~(unsigned)(COLLIDE_TRUST_POSES | COLLIDE_UNSIGNED)) != 0)
         return COLLIDE_INVALID_ARGUMENT;
     *how = shape->ints[KIND] == HALFSPACE ? BY_HULL : shape->ints[KIND] == POINTS ? BY_FACETS : BY_WALK;

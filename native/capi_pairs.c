@@ -88,6 +88,7 @@ collide_status collide_workspace_create(collide_workspace **workspace)
     *workspace = NULL;
     if ((kernels = kernels_here()) == NULL) return COLLIDE_NO_KERNELS;
     if ((made = calloc(1, sizeof *made)) == NULL) return COLLIDE_NO_MEMORY;
+    made->word = WORKSPACE_WORD;
     made->kernels = kernels;
     if (!allocate_workspace(made)) {
         collide_workspace_free(made);
@@ -99,7 +100,8 @@ collide_status collide_workspace_create(collide_workspace **workspace)
 
 void collide_workspace_free(collide_workspace *workspace)
 {
-    if (workspace == NULL) return;
+    if (!IS_HANDLE(workspace, WORKSPACE_WORD)) return;
+    end_handle(&workspace->word);
     if (workspace->manifold != NULL) free_manifolds(workspace->manifold);
     free(workspace->manifold);
     free(workspace->impact);
@@ -239,7 +241,7 @@ collide_status collide_collide(collide_workspace *workspace, const collide_shape
     int64_t result;
     if (hit == NULL) return COLLIDE_INVALID_ARGUMENT;
     *hit = 0;
-    if (workspace == NULL || A == NULL || B == NULL || X_WA == NULL || X_WB == NULL || are_none(flags))
+    if (!IS_HANDLE(workspace, WORKSPACE_WORD) || !IS_HANDLE(A, SHAPE_WORD) || !IS_HANDLE(B, SHAPE_WORD) || X_WA == NULL || X_WB == NULL || are_none(flags))
         return COLLIDE_INVALID_ARGUMENT;
     given = round_as_kernels_do();
     take_pair(workspace, A, B);
@@ -265,7 +267,7 @@ collide_status collide_distance(collide_workspace *workspace, const collide_shap
     int64_t result;
     if (pair == NULL) return COLLIDE_INVALID_ARGUMENT;
     memset(pair, 0, sizeof *pair);
-    if (workspace == NULL || A == NULL || B == NULL || X_WA == NULL || X_WB == NULL || are_none(flags) || !(max_distance >= 0.0))
+    if (!IS_HANDLE(workspace, WORKSPACE_WORD) || !IS_HANDLE(A, SHAPE_WORD) || !IS_HANDLE(B, SHAPE_WORD) || X_WA == NULL || X_WB == NULL || are_none(flags) || !(max_distance >= 0.0))
         return COLLIDE_INVALID_ARGUMENT;
     given = round_as_kernels_do();
     take_pair(workspace, A, B);
@@ -370,7 +372,7 @@ static collide_status ask_batch(collide_workspace *workspace, const collide_shap
 {
     struct question asked;
     if (failed != NULL) *failed = 0;
-    if (workspace == NULL || A == NULL || B == NULL || !(limit >= 0.0)) return COLLIDE_INVALID_ARGUMENT;
+    if (!IS_HANDLE(workspace, WORKSPACE_WORD) || !IS_HANDLE(A, SHAPE_WORD) || !IS_HANDLE(B, SHAPE_WORD) || !(limit >= 0.0)) return COLLIDE_INVALID_ARGUMENT;
     take_pair(workspace, A, B);
     asked.which = NULL;
     asked.n = longer(X_WA, X_WB);
@@ -402,7 +404,7 @@ static collide_status ask_each(collide_workspace *workspace, const collide_shape
     struct question asked;
     size_t k;
     if (failed != NULL) *failed = 0;
-    if (workspace == NULL || set == NULL || !(limit >= 0.0)) return COLLIDE_INVALID_ARGUMENT;
+    if (!IS_HANDLE(workspace, WORKSPACE_WORD) || !IS_HANDLE(set, SET_WORD) || !(limit >= 0.0)) return COLLIDE_INVALID_ARGUMENT;
     if (n > 0 && (which == NULL || (hits == NULL && pairs == NULL))) return COLLIDE_INVALID_ARGUMENT;
     for (k = 0; k < 2 * n; k++)
         if (which[k] < 0 || (uint64_t)which[k] >= set->count) {

@@ -262,7 +262,7 @@ collide_status collide_raycast(collide_workspace *workspace, const collide_shape
     struct ray ray;
     collide_status status;
     if (failed != NULL) *failed = 0;
-    if (workspace == NULL || shape == NULL) return COLLIDE_INVALID_ARGUMENT;
+    if (!IS_HANDLE(workspace, WORKSPACE_WORD) || !IS_HANDLE(shape, SHAPE_WORD)) return COLLIDE_INVALID_ARGUMENT;
     ray.space = workspace;
     ray.flags = flags;
     ray.mesh = NULL;
@@ -281,7 +281,7 @@ collide_status collide_mesh_raycast(collide_workspace *workspace, const collide_
     struct ray_question asked = question_of(X_WA, origins, directions, max_distance, hits, statuses);
     struct ray ray;
     if (failed != NULL) *failed = 0;
-    if (workspace == NULL || mesh == NULL || mesh->radius != 0.0) return COLLIDE_INVALID_ARGUMENT;
+    if (!IS_HANDLE(workspace, WORKSPACE_WORD) || !IS_HANDLE(mesh, MESH_WORD) || mesh->radius != 0.0) return COLLIDE_INVALID_ARGUMENT;
     ray.space = workspace;
     ray.flags = flags;
     ray.mesh = mesh;
@@ -296,7 +296,7 @@ collide_status collide_compound_raycast(collide_workspace *workspace, const coll
     struct ray_question asked = question_of(X_WA, origins, directions, max_distance, hits, statuses);
     struct ray ray;
     if (failed != NULL) *failed = 0;
-    if (workspace == NULL || compound == NULL) return COLLIDE_INVALID_ARGUMENT;
+    if (!IS_HANDLE(workspace, WORKSPACE_WORD) || !IS_HANDLE(compound, COMPOUND_WORD)) return COLLIDE_INVALID_ARGUMENT;
     if (compound->is_whole)
         return collide_raycast(workspace, compound->shapes[0], X_WA, origins, directions, max_distance, flags, hits, statuses, failed);
     ray.space = workspace;

@@ -98,8 +98,9 @@ collide_status collide_robot_workspace_create(const collide_robot *robot, collid
     collide_robot_workspace *space;
     if (workspace == NULL) return COLLIDE_INVALID_ARGUMENT;
     *workspace = NULL;
-    if (robot == NULL) return COLLIDE_INVALID_ARGUMENT;
+    if (!IS_HANDLE(robot, ROBOT_WORD)) return COLLIDE_INVALID_ARGUMENT;
     if ((space = calloc(1, sizeof *space)) == NULL) return COLLIDE_NO_MEMORY;
+    space->word = ROBOT_SPACE_WORD;
     space->robot = robot;
     arena_begin(&space->arena);
     if (begin_workspace(space)) *workspace = space;
@@ -109,7 +110,8 @@ collide_status collide_robot_workspace_create(const collide_robot *robot, collid
 
 void collide_robot_workspace_free(collide_robot_workspace *workspace)
 {
-    if (workspace == NULL) return;
+    if (!IS_HANDLE(workspace, ROBOT_SPACE_WORD)) return;
+    end_handle(&workspace->word);
     end_motions(workspace);
     collide_workspace_free(workspace->pairs);
     free(workspace->rows);
@@ -144,8 +146,8 @@ collide_status end_unanswered(const struct unanswered *rest, size_t n)
 
 int are_configurations(const collide_robot_workspace *space, const double *q, size_t n)
 {
-    const int64_t columns = space == NULL ? 0 : space->robot->sizes[F_COLUMNS];
-    if (space == NULL || n > (size_t)1 << 40 || (q == NULL && n > 0 && columns > 0)) return 0;
+    const int64_t columns = !IS_HANDLE(space, ROBOT_SPACE_WORD) ? 0 : space->robot->sizes[F_COLUMNS];
+    if (!IS_HANDLE(space, ROBOT_SPACE_WORD) || n > (size_t)1 << 40 || (q == NULL && n > 0 && columns > 0)) return 0;
     return n == 0 || space->robot->kernels->are_finite(address_of(q), (int64_t)n * columns);
 }
 

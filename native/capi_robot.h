@@ -113,6 +113,7 @@ enum {
 };
 
 struct collide_robot {
+    int64_t word;
     const struct collide_kernels *kernels;
     int64_t *file; /* the words that the sections are in */
     int64_t counts[N_SECTIONS];
@@ -128,6 +129,7 @@ struct collide_robot {
 
 /* What a thread's questions are worked out in. */
 struct collide_robot_workspace {
+    int64_t word;
     const collide_robot *robot;
     collide_workspace *pairs; /* of questions about meshes, or NULL */
     int64_t scene[SCENE_HEADER], spheres[SPHERE_HEADER], motions[MOTION_HEADER], search[SEARCH];

@@ -76,7 +76,7 @@ collide_status collide_robot_move_around(collide_robot_workspace *workspace, con
     size_t unread;
     if (failed == NULL) failed = &unread;
     *failed = 0;
-    if (workspace == NULL) return COLLIDE_INVALID_ARGUMENT;
+    if (!IS_HANDLE(workspace, ROBOT_SPACE_WORD)) return COLLIDE_INVALID_ARGUMENT;
     given = round_as_kernels_do();
     status = check_around(workspace->robot, bodies, n, X_WBs, failed);
     if (status == COLLIDE_OK && n > 0) status = move_around(workspace, bodies, n, X_WBs);
@@ -86,7 +86,7 @@ collide_status collide_robot_move_around(collide_robot_workspace *workspace, con
 
 collide_status collide_robot_pose_around(const collide_robot_workspace *workspace, int32_t body, double X_WB[16])
 {
-    if (workspace == NULL || X_WB == NULL || body >= 0 || -1 - (int64_t)body >= workspace->robot->sizes[F_AROUND])
+    if (!IS_HANDLE(workspace, ROBOT_SPACE_WORD) || X_WB == NULL || body >= 0 || -1 - (int64_t)body >= workspace->robot->sizes[F_AROUND])
         return COLLIDE_INVALID_ARGUMENT;
     memcpy(X_WB, workspace->X_WBs + MATRIX * (-1 - (int64_t)body), MATRIX * sizeof(double));
     return COLLIDE_OK;

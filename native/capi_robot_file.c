@@ -126,6 +126,7 @@ collide_status collide_robot_read(const void *bytes, size_t n, collide_robot **r
     *robot = NULL;
     if (bytes == NULL) return COLLIDE_INVALID_ARGUMENT;
     if ((made = calloc(1, sizeof *made)) == NULL) return COLLIDE_NO_MEMORY;
+    made->word = ROBOT_WORD;
     arena_begin(&made->arena);
     made->kernels = kernels_here();
     given = round_as_kernels_do();
@@ -164,16 +165,17 @@ collide_status collide_robot_load(const char *path, collide_robot **robot)
 void collide_robot_free(collide_robot *robot)
 {
     int64_t k;
-    if (robot == NULL) return;
+    if (!IS_HANDLE(robot, ROBOT_WORD)) return;
+    end_handle(&robot->word);
     for (k = 0; robot->shapes != NULL && k < robot->sizes[F_SHAPES]; k++) collide_shape_free(robot->shapes[k]);
     free_meshes(robot);
     arena_end(&robot->arena);
     free(robot);
 }
 
-size_t collide_robot_columns(const collide_robot *robot) { return robot == NULL ? 0 : (size_t)robot->sizes[F_COLUMNS]; }
-size_t collide_robot_bodies(const collide_robot *robot) { return robot == NULL ? 0 : (size_t)robot->sizes[F_BODIES]; }
-size_t collide_robot_around(const collide_robot *robot) { return robot == NULL ? 0 : (size_t)robot->sizes[F_AROUND]; }
+size_t collide_robot_columns(const collide_robot *robot) { return !IS_HANDLE(robot, ROBOT_WORD) ? 0 : (size_t)robot->sizes[F_COLUMNS]; }
+size_t collide_robot_bodies(const collide_robot *robot) { return !IS_HANDLE(robot, ROBOT_WORD) ? 0 : (size_t)robot->sizes[F_BODIES]; }
+size_t collide_robot_around(const collide_robot *robot) { return !IS_HANDLE(robot, ROBOT_WORD) ? 0 : (size_t)robot->sizes[F_AROUND]; }
 
 const char *collide_robot_column_name(const collide_robot *robot, size_t column)
 {
@@ -183,7 +185,7 @@ const char *collide_robot_column_name(const collide_robot *robot, size_t column)
 const char *collide_robot_body_name(const collide_robot *robot, int32_t body)
 {
     int64_t number = body;
-    if (robot == NULL || number >= robot->sizes[F_BODIES] || -1 - number >= robot->sizes[F_AROUND]) return NULL;
+    if (!IS_HANDLE(robot, ROBOT_WORD) || number >= robot->sizes[F_BODIES] || -1 - number >= robot->sizes[F_AROUND]) return NULL;
     if (number < 0) number = robot->sizes[F_BODIES] - 1 - number;
     return robot->texts[robot->sizes[F_COLUMNS] + number];
 }

@@ -75,6 +75,7 @@ static collide_status shape_of_points(const double *points, size_t n, double rad
     collide_status status;
     rounding given;
     if (shape == NULL) return COLLIDE_NO_MEMORY;
+    shape->word = SHAPE_WORD;
     shape->ints[KIND] = POINTS;
     shape->numbers[RADIUS] = radius;
     shape->numbers[SLOP] = slop;
@@ -91,6 +92,7 @@ static collide_status shape_of_numbers(int kind, const double *params, size_t n,
     collide_shape *shape;
     if (kernels_here() == NULL) return COLLIDE_NO_KERNELS;
     if ((shape = calloc(1, sizeof *shape)) == NULL) return COLLIDE_NO_MEMORY;
+    shape->word = SHAPE_WORD;
     shape->ints[KIND] = kind;
     shape->ints[LOWEST] = NO_BITS;
     shape->numbers[REACH] = reach;
@@ -102,7 +104,8 @@ static collide_status shape_of_numbers(int kind, const double *params, size_t n,
 
 void collide_shape_free(collide_shape *shape)
 {
-    if (shape == NULL) return;
+    if (!IS_HANDLE(shape, SHAPE_WORD)) return;
+    end_handle(&shape->word);
     free(shape->tree);
     free_faces(shape->faces);
     collide_mesh_free(shape->surface);
@@ -352,8 +355,9 @@ collide_status collide_shape_set_create(const collide_shape *const *shapes, size
     *set = NULL;
     if (shapes == NULL || n == 0 || n > (size_t)1 << 40 || n > (size_t)-1 / 64) return COLLIDE_INVALID_ARGUMENT;
     for (k = 0; k < n; k++)
-        if (shapes[k] == NULL) return COLLIDE_INVALID_ARGUMENT;
+        if (!IS_HANDLE(shapes[k], SHAPE_WORD)) return COLLIDE_INVALID_ARGUMENT;
     if ((made = calloc(1, sizeof *made)) == NULL) return COLLIDE_NO_MEMORY;
+    made->word = SET_WORD;
     order = malloc(n * sizeof *order);
     made->count = n;
     made->ints = malloc(n * INTS * sizeof *made->ints);
@@ -373,7 +377,8 @@ collide_status collide_shape_set_create(const collide_shape *const *shapes, size
 
 void collide_shape_set_free(collide_shape_set *set)
 {
-    if (set == NULL) return;
+    if (!IS_HANDLE(set, SET_WORD)) return;
+    end_handle(&set->word);
     free(set->ints);
     free(set->numbers);
     free((void *)set->shapes);

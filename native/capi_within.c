@@ -87,7 +87,7 @@ collide_status collide_within(collide_workspace *workspace, const collide_shape 
     collide_status status = COLLIDE_OK;
     rounding given;
     if (failed != NULL) *failed = 0;
-    if (workspace == NULL || A == NULL || B == NULL || !(margin == 0.0 || (margin >= SMALLEST && margin <= LARGEST)) ||
+    if (!IS_HANDLE(workspace, WORKSPACE_WORD) || !IS_HANDLE(A, SHAPE_WORD) || !IS_HANDLE(B, SHAPE_WORD) || !(margin == 0.0 || (margin >= SMALLEST && margin <= LARGEST)) ||
         (flags & ~(unsigned)COLLIDE_TRUST_POSES) != 0)
         return COLLIDE_INVALID_ARGUMENT;
     if (margin == 0.0) return collide_collide_batch(workspace, A, B, X_WA, X_WB, flags, NULL, within, failed);

@@ -19,11 +19,11 @@ collide_status refuse(char *message, collide_status status, const char *format, 
     return status;
 }
 
-const char *collide_world_message(const collide_world *world) { return world != NULL ? world->message : "the world is NULL"; }
+const char *collide_world_message(const collide_world *world) { return IS_HANDLE(world, WORLD_WORD) ? world->message : "the world is NULL, or freed"; }
 
 const char *collide_workspace_message(const collide_workspace *workspace)
 {
-    return workspace != NULL ? workspace->message : "the workspace is NULL";
+    return IS_HANDLE(workspace, WORKSPACE_WORD) ? workspace->message : "the workspace is NULL, or freed";
 }
 
 /* --- memory --------------------------------------------------------------------------------------------------------- */
@@ -86,6 +86,7 @@ collide_status collide_world_create(collide_world **world)
     *world = NULL;
     if (kernels == NULL) return COLLIDE_NO_KERNELS;
     if ((made = calloc(1, sizeof *made)) == NULL) return COLLIDE_NO_MEMORY;
+    made->word = WORLD_WORD;
     made->kernels = kernels;
     status = begin_world(made) ? collide_hull(origin, 1, 0.0, &made->point) : COLLIDE_NO_KERNELS;
     if (status == COLLIDE_OK && !(reserve(made, 1) && resize(&made->allowed_rows, 1, 8))) status = COLLIDE_NO_MEMORY;
@@ -101,7 +102,8 @@ collide_status collide_world_create(collide_world **world)
 void collide_world_free(collide_world *world)
 {
     size_t k;
-    if (world == NULL) return;
+    if (!IS_HANDLE(world, WORLD_WORD)) return;
+    end_handle(&world->word);
     for (k = 0; k < world->n; k++) collide_shape_free(world->wholes[k].bound);
     free(world->wholes);
     free(world->ids);
@@ -238,7 +240,7 @@ collide_status collide_world_allow(collide_world *world, const int32_t *pairs, s
     static const char caller[] = "collide_world_allow";
     collide_status status;
     size_t k;
-    if (world == NULL) return COLLIDE_INVALID_ARGUMENT;
+    if (!IS_HANDLE(world, WORLD_WORD)) return COLLIDE_INVALID_ARGUMENT;
     if ((status = check_pairs(world, caller, pairs, n)) != COLLIDE_OK) return status;
     if (!reserve_keys(world, 2 * n)) return refuse(world->message, COLLIDE_NO_MEMORY, "%s: out of memory", caller);
     for (k = 0; k < n; k++) {
@@ -293,6 +295,8 @@ static collide_status check_body(collide_world *world, const collide_body *body,
     if ((body->shape != NULL) + (body->mesh != NULL) + (body->field != NULL) != 1)
         return refuse(world->message, COLLIDE_INVALID_ARGUMENT, "%s: bodies[%zu]: one of shape, mesh and field must not be NULL",
                       caller, k);
+    if (!is_alive(body->shape, body->mesh, body->field))
+        return refuse(world->message, COLLIDE_INVALID_ARGUMENT, "%s: bodies[%zu]: what it is to be was freed", caller, k);
     if (body->X_WB != NULL && check_poses(world, caller, body->X_WB, 1, NULL) != COLLIDE_OK)
         return refuse(world->message, COLLIDE_INVALID_POSE,
                       "%s: bodies[%zu]: X_WB is no pose: finite, a rotation, last row 0 0 0 1", caller, k);
@@ -340,7 +344,7 @@ collide_status collide_world_add(collide_world *world, const collide_body *bodie
     collide_status status;
     rounding given;
     size_t k;
-    if (world == NULL) return COLLIDE_INVALID_ARGUMENT;
+    if (!IS_HANDLE(world, WORLD_WORD)) return COLLIDE_INVALID_ARGUMENT;
     if (n == 0) return COLLIDE_OK;
     if (bodies == NULL || ids == NULL)
         return refuse(world->message, COLLIDE_INVALID_ARGUMENT, "%s: %s is NULL", caller, bodies == NULL ? "bodies" : "ids");
@@ -367,7 +371,7 @@ collide_status collide_world_remove(collide_world *world, int32_t id)
     int64_t row;
     rounding given;
     size_t k, n = 0;
-    if (world == NULL) return COLLIDE_INVALID_ARGUMENT;
+    if (!IS_HANDLE(world, WORLD_WORD)) return COLLIDE_INVALID_ARGUMENT;
     if ((row = row_of_id(world, id)) < 0) return unknown_body(world, "collide_world_remove", "id", 0, id);
     given = round_as_kernels_do();
     world->is_alive[row] = 0;
@@ -396,7 +400,7 @@ collide_status collide_world_move(collide_world *world, const int32_t *ids, size
     collide_status status;
     rounding given;
     size_t k;
-    if (world == NULL) return COLLIDE_INVALID_ARGUMENT;
+    if (!IS_HANDLE(world, WORLD_WORD)) return COLLIDE_INVALID_ARGUMENT;
     if ((status = check_ids(world, caller, "ids", ids, n)) != COLLIDE_OK || n == 0) return status;
     if (X_WBs == NULL) return refuse(world->message, COLLIDE_INVALID_ARGUMENT, "%s: X_WBs is NULL", caller);
     if ((status = check_poses(world, caller, X_WBs, n, ids)) != COLLIDE_OK) return status;
@@ -419,10 +423,12 @@ static collide_status replace(collide_world *world, const char *caller, int32_t 
     collide_status status = COLLIDE_OK;
     int64_t row, before;
     rounding given;
-    if (world == NULL) return COLLIDE_INVALID_ARGUMENT;
+    if (!IS_HANDLE(world, WORLD_WORD)) return COLLIDE_INVALID_ARGUMENT;
     if ((row = row_of_id(world, id)) < 0) return unknown_body(world, caller, "id", 0, id);
     if (shape == NULL && mesh == NULL && field == NULL)
         return refuse(world->message, COLLIDE_INVALID_ARGUMENT, "%s: what body %ld is to be is NULL", caller, (long)id);
+    if (!is_alive(shape, mesh, field))
+        return refuse(world->message, COLLIDE_INVALID_ARGUMENT, "%s: what body %ld is to be was freed", caller, (long)id);
     if (shape == NULL) status = make_whole(mesh, field, &whole);
     if (status != COLLIDE_OK) return refuse(world->message, status, "%s: %s", caller, collide_status_text(status));
     given = round_as_kernels_do();
@@ -457,7 +463,7 @@ collide_status collide_world_sleep(collide_world *world, const int32_t *ids, siz
 {
     collide_status status;
     size_t k;
-    if (world == NULL) return COLLIDE_INVALID_ARGUMENT;
+    if (!IS_HANDLE(world, WORLD_WORD)) return COLLIDE_INVALID_ARGUMENT;
     if ((status = check_ids(world, "collide_world_sleep", "ids", ids, n)) != COLLIDE_OK) return status;
     for (k = 0; k < n; k++) {
         int64_t *flags = world->traits + TRAITS * row_of_id(world, ids[k]) + FLAGS;
@@ -469,12 +475,12 @@ collide_status collide_world_sleep(collide_world *world, const int32_t *ids, siz
 
 /* --- what there is -------------------------------------------------------------------------------------------------- */
 
-size_t collide_world_size(const collide_world *world) { return world != NULL ? world->n_alive : 0; }
+size_t collide_world_size(const collide_world *world) { return IS_HANDLE(world, WORLD_WORD) ? world->n_alive : 0; }
 
 collide_status collide_world_pose(const collide_world *world, int32_t id, double X_WB[16])
 {
     int64_t row;
-    if (world == NULL || X_WB == NULL || (row = row_of_id(world, id)) < 0) return COLLIDE_INVALID_ARGUMENT;
+    if (!IS_HANDLE(world, WORLD_WORD) || X_WB == NULL || (row = row_of_id(world, id)) < 0) return COLLIDE_INVALID_ARGUMENT;
     memcpy(X_WB, world->X_WBs + 16 * row, 16 * sizeof(double));
     return COLLIDE_OK;
 }

@@ -63,6 +63,7 @@ struct whole_body {
 };
 
 struct collide_world {
+    int64_t word;
     const struct collide_kernels *kernels;
     int64_t measures[WORLD_MEASURES];
     /* Columns, a row a body in the order of ids; those of removed bodies stay until they are many. */
@@ -159,6 +160,9 @@ void sort_keys(struct world_space *own, size_t n_keys, size_t n);
 /* Answer up to BLOCK keys of bodies, or of a point and bodies where X_WP is not NULL, into own->hits or own->rows. */
 collide_status answer_keys(const collide_world *world, collide_workspace *space, const int64_t *keys, size_t n, const double *X_WP,
                            int boolean, double limit);
+
+/* capi_world_wholes.c: whether a body's shape, mesh or field, the others of which are NULL, was not freed. */
+int is_alive(const collide_shape *shape, const collide_mesh *mesh, const collide_field *field);
 
 /* capi_world_wholes.c: what a body with a mesh or a field is, as it is added. And a pair with such a body: whether it meets, or its
    row; what the pair queries of this interface do not answer is COLLIDE_UNSUPPORTED, and the bodies are named. */

@@ -115,7 +115,7 @@ static collide_status rows_of_shape(const collide_world *world, collide_workspac
 collide_status collide_world_query(const collide_world *world, collide_workspace *workspace, const collide_shape *shape,
                                    const double X_WS[16], double max_distance, collide_pair *rows, size_t capacity, size_t *count)
 {
-    int is_good = shape != NULL && X_WS != NULL && count != NULL && (capacity == 0 || rows != NULL) && max_distance >= 0.0;
+    int is_good = IS_HANDLE(shape, SHAPE_WORD) && X_WS != NULL && count != NULL && (capacity == 0 || rows != NULL) && max_distance >= 0.0;
     collide_status status = check_question(world, workspace, "collide_world_query", is_good,
                                            "shape, X_WS, rows or count is NULL, or max_distance is below 0");
     double pose[POSE];

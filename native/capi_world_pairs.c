@@ -183,8 +183,8 @@ collide_status no_memory(collide_workspace *space) { return refuse(space->messag
 collide_status check_question(const collide_world *world, collide_workspace *space, const char *caller, int is_good,
                               const char *what)
 {
-    if (space == NULL) return COLLIDE_INVALID_ARGUMENT;
-    if (world == NULL) return refuse(space->message, COLLIDE_INVALID_ARGUMENT, "%s: world is NULL", caller);
+    if (!IS_HANDLE(space, WORKSPACE_WORD)) return COLLIDE_INVALID_ARGUMENT;
+    if (!IS_HANDLE(world, WORLD_WORD)) return refuse(space->message, COLLIDE_INVALID_ARGUMENT, "%s: world is NULL, or freed", caller);
     if (!is_good) return refuse(space->message, COLLIDE_INVALID_ARGUMENT, "%s: %s", caller, what);
     return begin_question(world, space) ? COLLIDE_OK : no_memory(space);
 }

@@ -4,6 +4,11 @@
 #include "capi_mesh.h"
 #include "capi_world.h"
 
+int is_alive(const collide_shape *shape, const collide_mesh *mesh, const collide_field *field)
+{
+    return shape != NULL ? IS_HANDLE(shape, SHAPE_WORD) : mesh != NULL ? IS_HANDLE(mesh, MESH_WORD) : IS_HANDLE(field, FIELD_WORD);
+}
+
 collide_status make_whole(const collide_mesh *mesh, const collide_field *field, struct whole_body *whole)
 {
     const double *low = mesh != NULL ? mesh->low : field->low, *high = mesh != NULL ? mesh->high : field->high;

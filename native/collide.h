@@ -11,12 +11,14 @@
    Errors. Every function that can fail returns a collide_status and, unless that is COLLIDE_OK, leaves the objects that it
    was to make NULL. Nothing prints, nothing ends the process, nothing jumps.
 
-   Memory. Shapes, sets of shapes, unions, meshes, fields, worlds, robots and workspaces are made by functions of this header and
-   freed by the caller with collide_..._free, which take NULL. Numbers handed in are copied. Queries allocate nothing, but for contacts: the
-   first ones of a hull work out its faces, which are kept with it, and the first ones of a workspace what manifolds are made in;
-   but for the first casts, motions and unions of a workspace, which make its room for them, and each new pair of unions; but for
-   fields, where a walk leaves a pair open: then a list of the items nearby; and but for worlds, whose lists of pairs are kept with
-   the workspace, and grow.
+   Memory. Shapes, sets of shapes, unions, meshes, fields, worlds, robots and workspaces are made by functions of this header
+   and freed by the caller with collide_..._free, which take NULL. A handle that was freed, or one of another type, is
+   COLLIDE_INVALID_ARGUMENT, and freeing such a one does nothing, for as long as its memory tells: a help to find mistakes that
+   no program may rely on, since its memory may be another object's by then, or nobody's. Numbers handed in are copied. Queries
+   allocate nothing, but for contacts: the first ones of a hull work out its faces, which are kept with it, and the first ones
+   of a workspace what manifolds are made in; but for the first casts, motions and unions of a workspace, which make its room
+   for them, and each new pair of unions; but for fields, where a walk leaves a pair open: then a list of the items nearby; and
+   but for worlds, whose lists of pairs are kept with the workspace, and grow.
 
    Threads. A shape, a set, a union, a mesh, a field or a robot never changes: any number of threads may use one at once. A workspace is for
    one thread at a time: give each thread its own. A world may be asked by many at once while nobody changes it. Nothing else is

@@ -654,6 +654,53 @@ def test_arguments_out_of_range_are_told():
         getattr(library, function)(None)
 
 
+def test_handles_that_were_freed_or_are_of_another_type_are_refused():
+    """As long as their memory is nobody else's, and what frees them does nothing."""
+    library, X, row = c.library(), np.eye(4), np.zeros(1, PAIR_DTYPE)
+    tetrahedron = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
+    handles, points = {"shape": c.raw_shape("collide_sphere", 0.5)[1]}, np.vstack([np.zeros(3), np.eye(3)])
+    of_one = (ctypes.c_void_p * 1)(handles["shape"])
+    for name, function, arguments in (
+        ("shape_set", "collide_shape_set_create", (of_one, 1)), ("workspace", "collide_workspace_create", ()),
+        ("compound", "collide_compound_create", (of_one, X, 1)), ("world", "collide_world_create", ()),
+        ("field", "collide_point_cloud_create", (points, 4, np.full(1, 0.1), 1)),
+    ):
+        status, handles[name] = c.raw_shape(function, *arguments)
+        assert status == c.OK, name
+    handles["mesh"] = c.raw_mesh(points, tetrahedron, c.SOLID)[1]
+    body, world = c.Asker(), handles["world"]
+
+    def statuses() -> dict[str, int]:
+        """What each handle is told in the place of each other."""
+        one = ctypes.c_size_t(1)
+        at, space, out = X.ctypes.data, body.handle, row.ctypes.data
+        asked: dict[str, int] = {}
+        for name, handle in handles.items():
+            poses = c.Poses(at, 1)
+            asked["shape", name] = library.collide_distance(space, handle, handle, at, at, 1.0, 0, out)
+            asked["mesh", name] = library.collide_mesh_collide(space, handle, handle, at, at, 0, ctypes.c_int())
+            asked["compound", name] = library.collide_compound_distance(
+                space, handle, handle, poses, poses, 1.0, 0, out, one)
+            asked["field", name] = library.collide_point_cloud_within(handle, points.ctypes.data, 1.0, None, 0, one)
+            asked["world", name] = library.collide_world_collides(handle, space, ctypes.c_int())
+            asked["shape_set", name] = library.collide_collide_each(
+                space, handle, np.zeros(2, np.int64).ctypes.data, 1, poses, poses, 0, None, out, one)
+            asked["workspace", name] = library.collide_world_collides(world, handle, ctypes.c_int())
+        return asked
+
+    for (wanted, name), status in statuses().items():
+        assert (status != c.INVALID_ARGUMENT) is (wanted == name), (wanted, name, status)
+    for wanted in handles:
+        for name, handle in handles.items():
+            if wanted != name:
+                getattr(library, f"collide_{wanted}_free")(handle)
+    assert sum(status != c.INVALID_ARGUMENT for status in statuses().values()) == len(handles), "one was freed"
+    for name in ("shape_set", "compound", "world", "shape", "workspace", "field", "mesh"):
+        for _ in range(2):
+            getattr(library, f"collide_{name}_free")(handles[name])
+    assert set(statuses().values()) == {c.INVALID_ARGUMENT}
+
+
 def test_processors_level_is_that_of_the_environment():
     ask = (
         "import ctypes, sys; lib = ctypes.CDLL(sys.argv[1]); level = ctypes.c_char_p(); out = ctypes.c_void_p();"
