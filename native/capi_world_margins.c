@@ -101,7 +101,7 @@ collide_status collide_world_set_margins(collide_world *world, const int32_t *id
     static const char caller[] = "collide_world_set_margins";
     collide_status status;
     size_t k;
-    if (world == NULL) return COLLIDE_INVALID_ARGUMENT;
+    if (!IS_HANDLE(world, WORLD_WORD)) return COLLIDE_INVALID_ARGUMENT;
     if ((status = check_ids(world, caller, "ids", ids, n)) != COLLIDE_OK || n == 0) return status;
     if (margins == NULL) return refuse(world->message, COLLIDE_INVALID_ARGUMENT, "%s: margins is NULL", caller);
     if ((status = check_margins(world, caller, margins, n)) != COLLIDE_OK) return status;
@@ -142,7 +142,7 @@ collide_status collide_world_set_pair_margins(collide_world *world, const int32_
     static const char caller[] = "collide_world_set_pair_margins";
     collide_status status;
     size_t k;
-    if (world == NULL) return COLLIDE_INVALID_ARGUMENT;
+    if (!IS_HANDLE(world, WORLD_WORD)) return COLLIDE_INVALID_ARGUMENT;
     if ((status = check_pairs(world, caller, pairs, n)) != COLLIDE_OK || n == 0) return status;
     if (margins != NULL && (status = check_margins(world, caller, margins, n)) != COLLIDE_OK) return status;
     if (margins != NULL && !reserve_pairs(world, n)) return refuse(world->message, COLLIDE_NO_MEMORY, "%s: out of memory", caller);
