@@ -14,7 +14,7 @@ from collide.contact.support_face import ROUND
 from collide.kernels import entry, view_i64
 
 #: In this order (`native/capi_mesh_contacts.c`, `native/capi_compound_contacts.c`,
-#: `native/capi_curved_contact_call.c`).
+#: `native/capi_curved_contacts.c`).
 _CONSTANTS = np.array(
     [
         FACETS_HEADER, TOPOLOGY, PAIRS_OF_SINGLE_CALLS, ROWS_OF_SINGLE_CALLS, workspace_words(PAIRS_OF_SINGLE_CALLS),
