@@ -59,6 +59,7 @@ soaks() {
     run soak-memory python tests/soak/soak_memory.py --shapes 30000 --seed "$seed"
     run soak-pairs python tests/soak/soak.py --minutes 6 --seed "$seed"
     run soak-contacts python tests/soak/soak_contacts.py --pairs 20000 --seed "$seed"
+    run soak-c-interface python tests/soak/soak_c_interface.py --calls 3000000 --seed "$seed"
     run soak-motions python tests/soak/soak_motions.py --motions 5000 --seed "$seed"
     run soak-solids python tests/soak/soak_solids.py --chains 80 --seed "$seed"
     run soak-threads python tests/soak/soak_threads.py --pairs 200 --rounds 3 --seed "$seed"
