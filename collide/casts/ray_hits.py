@@ -7,10 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from collide.base.lazy_modules import lazy_module
 from collide.casts.directions import Directions
-from collide.casts.ray_ends import first_places, write_places
 from collide.kernels import address_of
 from collide.results import only_value
+
+#: Knows of facets, which worlds of convex bodies do not load.
+ray_ends = lazy_module("collide.casts.ray_ends")
 
 #: Rows of a World's hits, of kernels too; `collide.worlds.hits` says what the fields are.
 WORLD_HIT_DTYPE = np.dtype(
@@ -98,7 +101,7 @@ def first_of_each(events: RayEvents) -> RayEvents:
     n = len(events.ray)
     t, flags = np.ascontiguousarray(events.t).copy(), np.stack([events.proven, events.certified], axis=1)
     columns, first = np.stack([events.ray, events.facet, events.item], axis=1), np.empty(n, dtype=np.int64)
-    count = first_places(address_of(t), address_of(columns), address_of(flags), n, address_of(first))
+    count = ray_ends.first_places(address_of(t), address_of(columns), address_of(flags), n, address_of(first))
     rows = first[:count]
     return events.of(rows)._replace(t=t[rows], proven=flags[rows, 0], certified=flags[rows, 1])
 
@@ -110,7 +113,7 @@ def as_hits(events: RayEvents, origins: np.ndarray, directions: Directions, *, e
         events = first_of_each(events)
     ray, t = events.ray, events.t
     points, held = np.empty((len(ray), 3)), [np.ascontiguousarray(values) for values in (origins, *directions, ray, t)]
-    write_places(*map(address_of, held), len(ray), address_of(points))
+    ray_ends.write_places(*map(address_of, held), len(ray), address_of(points))
     columns = (
         np.ones(len(ray), dtype=bool), t[:, 0], t[:, 1], t[:, 2], points, events.normal,
         events.facet, None, events.certified, events.item,

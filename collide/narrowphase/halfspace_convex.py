@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from collide.kernels import kernel, view_f64, view_i64
 from collide.lowering.packed_convex import POINTS
-from collide.narrowphase.bounds import ERROR
+from collide.narrowphase.bounds import ERROR, PROMISE_GAP
 from collide.narrowphase.gap.curved_features import ERROR as CURVED_ERROR
 from collide.narrowphase.gap.curved_features import curved_reach, turned_back
 from collide.narrowphase.gap.precise_pair import HEIGHT_ERROR, add_products, is_composed, is_refinable, unit_scale
@@ -143,9 +143,11 @@ def halfspace_convex(ordered, query, row, work):
             refined = refine_curved_height(pair, work.fine_at, coarse.size, coarse.skew)
         if refined.proven:
             bracket = dd.bracket(dd.sub(refined.height, DD(radius_of(pair, pair.B), 0.0)), refined.error)
-            gap = bracket.nearest
-            lower = max(lower, bracket.lower)
-            upper = min(upper, bracket.upper)
+            # Of a curved core that nearly touches, integers know the sign and more digits.
+            if exact_numbers or decided or bracket.upper - bracket.lower <= PROMISE_GAP * abs(bracket.nearest):
+                gap = bracket.nearest
+                lower = max(lower, bracket.lower)
+                upper = min(upper, bracket.upper)
     width = 0.0 if exact_numbers and not query.boolean else math.inf
     write_verdict(row, gap, lower, upper, FORMULA, width, query.limit)
     if exact_numbers and (not decided or (row.flags[CERTIFIED] == 0 and not query.boolean)):

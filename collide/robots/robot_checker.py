@@ -530,6 +530,7 @@ class RobotChecker(CheckerScene):
         Spheres and maps of the links are made first, unless made already: a few tenths of a second. Some hundred
         kilobytes.
         """
+        path = checks.file_path("RobotChecker.save: path", path)
         self.make_spheres()
         made = checker_bytes(self._as_of_now())
         with whole_file(path) as stream:

@@ -30,7 +30,7 @@ CONVEX = (
     "ellipsoid",
 )
 #: Where `struct collide_shape` keeps its faces: after eight integers, seven doubles, a digest and three addresses.
-_FACES_AT = 8 * (8 + 7 + 2 + 3)
+_FACES_AT = 8 * (1 + 8 + 7 + 2 + 3)
 
 
 def rotated(random: np.random.Generator) -> np.ndarray:

@@ -194,7 +194,7 @@ def test_trees_are_pythons_array_by_array():
         for points in (random.normal(size=(n, 3)), random.integers(0, 9, (n, 3)) / 8.0, np.full((n, 3), 1e-320)):
             cloud = collide.PointCloud(points, 0.01)
             mine, tree = c.CField(cloud), cloud.tree
-            header = _words(mine.handle, 9)
+            header = _words(mine.handle + 8, 9)  # behind the handle's word
             assert header[4:8].tolist() == [len(tree._nodes), n, tree.depth, tree._header[7]]
             assert _words(header[0], tree._nodes.size, np.int32).tobytes() == tree._nodes.tobytes(), n
             assert _words(header[1], 3 * n, np.float64).tobytes() == points.tobytes()
@@ -207,7 +207,7 @@ def test_trees_are_pythons_array_by_array():
         occupied[-1, 0, 0] = 255
         grid = collide.VoxelGrid(occupied > 0, (0.1, 0.2, 0.3), c.identity_at(1.0, 0.1, -0.7))
         mine, tree = c.CField(grid, occupied), grid.tree
-        header = _words(mine.handle, 22)
+        header = _words(mine.handle + 8, 22)
         assert header[[5, 6]].tolist() == [grid.count, tree.levels]
         assert header[13:].tolist() == tree._header[13:].tolist()
         for k, part in enumerate(tree.nodes):

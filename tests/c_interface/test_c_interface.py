@@ -429,7 +429,7 @@ def test_batches_of_a_pair_have_pythons_bits(still):
 def _tree_of(shape: c.CShape):
     """(integers of the header, arrays) of a shape's support tree, read where kernels read it; None where there is
     none."""
-    address = (ctypes.c_int64 * 8).from_address(shape.handle)[6]
+    address = (ctypes.c_int64 * 8).from_address(shape.handle)[7]
     if address == 0:
         return None
     header = np.ctypeslib.as_array((ctypes.c_int64 * 13).from_address(address))
@@ -528,8 +528,8 @@ def test_polytopes_of_halfspaces_are_pythons():
             refused += 1
             assert status == c.INVALID_SHAPE and handle is None, number
             continue
-        numbers = np.ctypeslib.as_array((ctypes.c_double * 3).from_address(handle + 64)).tolist()
-        content = ctypes.string_at(handle + 64 + 56, 16)
+        numbers = np.ctypeslib.as_array((ctypes.c_double * 3).from_address(handle + 72)).tolist()
+        content = ctypes.string_at(handle + 72 + 56, 16)
         c.library().collide_shape_free(handle)
         assert numbers == [0.0, packed.reach, packed.slop] and content == packed.content, number
     assert 20 < refused < 180, refused

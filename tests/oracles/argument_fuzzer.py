@@ -466,6 +466,8 @@ METHODS: dict[str, Callable[[], dict[str, Any]]] = {
     "RobotChecker.from_scene": lambda: {"scene": scene()},
     "RobotChecker.attach": lambda: {"name": "cup", "link": robot().links[-1], "shape": collide.Sphere(0.01)},
     "RobotChecker.detach": lambda: {"name": "held"},
+    "HeightField.inertia": lambda: {"density": 1.0},
+    "Mesh.inertia": lambda: {"density": 1.0},
     "RobotChecker.allow": lambda: {"a": robot().links[-1], "b": "held"},
     "RobotChecker.certify_path": lambda: {"Q": [[0.0], [0.1]]},
     "RobotChecker.certify_spline": lambda: {"motion": spline()},
@@ -751,6 +753,7 @@ def words_of(value: Any) -> list[str]:
             read = np.asarray(value)
             words += [_KINDS.get(read.dtype.kind, ""), str(read.dtype), str(read.shape[1:])]
             words += [f"(n, {read.shape[-1]})"] if read.ndim > 1 else []
+            words += [str(len(read))] if read.ndim > 2 else []  # of a batch how many there are
     elif isinstance(value, str):
         words += [value, str(Path(value))]
     elif (number := float_of(value)) is not None:

@@ -55,7 +55,9 @@ from collide.numerics.vec3 import Vec3, cross, divide, dot, norm, scale, sub, un
 #: How near to a flat feature, in radians, a direction of EPA is for that feature to be taken.
 _FLAT = 0.03
 #: What points may be off the normal by, of the depth: bounds lose a product with that, of itself or of a narrow cone.
-_ACROSS = 2.0**-36
+_ACROSS = 2.0**-44
+#: Points farther off the normal than this, in units of the pair's size, are no answer.
+_ASIDE = 2.0**-43
 #: Least and greatest tangent of the cone about the direction.
 _NARROWEST, _WIDEST = 2.0**-20, 0.25
 #: What entries of the form may be off by, of the numbers that they are worked out from: some dozen roundings.
@@ -134,7 +136,9 @@ def _bracket(pair, s, v, length, lower, work):
     upper = dd.div(dd.add(dd.inner(s.n, v), excess), length)
     error, over = ERROR * s.size, 1.0 / s.unit
     least, greatest = dd.bracket(lower, error), dd.bracket(upper, error)
-    is_proven = s.is_found and 0.5 < length.high < 2.0 and 0.0 < least.lower < math.inf and greatest.upper < math.inf
+    off = norm(dd.leading(dd.sub_vec3(v, dd.times_vec3(dd.div(dd.inner(s.n, v), dd.inner(s.n, s.n)), s.n))))
+    is_good = s.is_found and 0.5 < length.high < 2.0 and off <= _ASIDE * s.size
+    is_proven = is_good and 0.0 < least.lower < math.inf and greatest.upper < math.inf
     return CurvedDepth(
         is_proven, over * least.lower, over * greatest.upper, divide(dd.leading(s.n), length.high),
         scale(over, dd.leading(s.p.point)), scale(over, dd.leading(s.q.point))

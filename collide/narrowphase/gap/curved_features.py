@@ -51,6 +51,8 @@ _STEPS = 5
 _ALONG = 2.0**-56
 # Unknowns: n, g, up to two flat coordinates of each set.
 _MAX_UNKNOWNS = 8
+#: Points off the normal by more than this, in units of the pair's size, are brought together along their lines.
+_ASIDE = 2.0**-45
 #: Doubles of workspace.
 DOUBLES = _MAX_UNKNOWNS * (_MAX_UNKNOWNS + 1)
 
@@ -158,7 +160,34 @@ def nearest_features(ordered, work, n_points, named, nhat, flat, across, memory_
         p = placed(pair, A, inner_f, n, unit)
     if _is_moved(h, inner_h):
         q = placed(pair, B, inner_h, away, unit)
+    # Parallel lines share a stretch: where a point was moved back onto its own, the opposite point follows.
+    for _ in range(2):
+        aside = _aside(dd.sub_vec3(dd.add_vec3(q.point, t), p.point), n)
+        if norm(aside) <= _ASIDE * size:
+            break
+        if inner_h.flat == 1:
+            inner_h = _within(pair, B, _along(inner_h, q, neg(aside)), unit)
+            q = placed(pair, B, inner_h, away, unit)
+            aside = _aside(dd.sub_vec3(dd.add_vec3(q.point, t), p.point), n)
+        if inner_f.flat == 1:
+            inner_f = _within(pair, A, _along(inner_f, p, aside), unit)
+            p = placed(pair, A, inner_f, n, unit)
     return Nearest(is_found, inner_f, inner_h, p, q, n, t, size, unit)
+
+
+@kernel(inline=True)
+def _aside(v, n):
+    """What of v is across n."""
+    m, w = dd.leading(n), dd.leading(v)
+    return sub(w, scale(dot(w, m) / dot(m, m), m))
+
+
+@kernel(inline=True)
+def _along(f, placed_f, step):
+    """A feature with its flat coordinate moved as near to a step as its line goes."""
+    d = dd.leading(placed_f.d)
+    s = dd.add(f.s, DD(dot(step, d) / dot(d, d), 0.0))
+    return Feature(f.kind, f.end, f.flat, f.i, f.j, f.k, s, f.t)
 
 
 @kernel(inline=True)
