@@ -17,6 +17,7 @@ from collide.lowering.packed_convex import CYLINDER, POINTS
 from collide.narrowphase.gjk.minkowski_difference import POINT_OF_A, POINT_OF_B, difference_point, height
 from collide.narrowphase.posed_pair import reach_of
 from collide.narrowphase.shallow_ellipsoids import NOTHING, ShallowDepth
+from collide.numerics.rigid_poses import off_rotation
 from collide.numerics.vec3 import Vec3, add, cross, dot, neg, norm, put_vec3, rotate, rotate_back, scale, sub, vec3_at
 
 #: Directions tried around a cylinder, for the point of a rim or for a corner; after so many, a point beyond the
@@ -28,7 +29,6 @@ _PARALLEL = 2.0**-20
 _LEVEL = 2.0**-10
 #: A matrix farther off a rotation is left to EPA.
 _FAR_OFF = 2.0**-40
-_U = 2.0**-53
 
 #: What a normal belongs to: a flat face of A or B, or the side of a cylinder, which the last two do.
 _FACE_OF_A, _FACE_OF_B, _SIDE = range(3)
@@ -306,9 +306,7 @@ def _proven(pair, points, ids, weights, of_a, nhat, b, tolerance):
     2δ, and moves points mapped back by its transpose by δ of the reach.
     """
     owner = pair.A if of_a else pair.B
-    x, y, z = _column(pair, owner, 0), _column(pair, owner, 1), _column(pair, owner, 2)
-    off = max(max(abs(dot(x, x) - 1.0), abs(dot(y, y) - 1.0)), abs(dot(z, z) - 1.0))
-    off = 3.0 * (max(max(off, abs(dot(x, y))), max(abs(dot(y, z)), abs(dot(z, x)))) + 4.0 * _U)
+    off = 3.0 * off_rotation(pair.poses, owner.pose_at)
     p = rotate_back(pair.poses, owner.pose_at, b)
     at = owner.params_at
     p0, p1 = pair.numbers[at], pair.numbers[at + 1]

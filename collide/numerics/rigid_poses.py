@@ -12,9 +12,11 @@ _ROUNDED = 2.0**-51
 
 
 @kernel(inline=True)
-def off_rotation(R):
-    """How far a matrix, row by row, is off a rotation: the largest entry of RᵀR − I, and rounding."""
-    x, y, z = Vec3(R[0], R[3], R[6]), Vec3(R[1], R[4], R[7]), Vec3(R[2], R[5], R[8])
+def off_rotation(poses, at):
+    """How far the matrix at a place, row by row, is off a rotation: the largest entry of RᵀR − I, and rounding."""
+    x = Vec3(poses[at], poses[at + 3], poses[at + 6])
+    y = Vec3(poses[at + 1], poses[at + 4], poses[at + 7])
+    z = Vec3(poses[at + 2], poses[at + 5], poses[at + 8])
     off = max(max(abs(dot(x, x) - 1.0), abs(dot(y, y) - 1.0)), abs(dot(z, z) - 1.0))
     return max(max(off, abs(dot(x, y))), max(abs(dot(y, z)), abs(dot(z, x)))) + _ROUNDED
 

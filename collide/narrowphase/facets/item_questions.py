@@ -176,7 +176,7 @@ def begin_walk(header_at):
     words = view_i64(header_at, HEADER)
     ints, numbers = view_i64(words[INTS_AT], 2 * INTS), view_f64(words[NUMBERS_AT], 2 * NUMBERS)
     poses, tree = view_f64(words[POSES_AT], 2 * POSE), open_tree(words[TREE_AT])
-    off = off_rotation(poses)
+    off = off_rotation(poses, 0)
     t = sub(vec3_at(poses, POSE + 9), vec3_at(poses, 9))
     reach = norm1(vec3_at(tree.numbers, TREE_REACH)) + numbers[NUMBERS + REACH] + numbers[NUMBERS + RADIUS] + norm1(t)
     radius = view_f64(header_at + 8 * LARGEST_RADIUS, 1)[0]

@@ -103,7 +103,7 @@ def clouds_meet_balls(
         if step_a != 0 or k == 0:
             if not set_pose(poses, 0, view_f64(XA_at + 8 * step_a * k, 16), check):
                 return k
-            off = off_rotation(poses)
+            off = off_rotation(poses, 0)
         if (step_b != 0 or k == 0) and not set_pose(poses, POSE, view_f64(XB_at + 8 * step_b * k, 16), check):
             return k
         states[k] = state_of_balls(tree, poses, centre, radius + other_radius, 0.0, off, stack)

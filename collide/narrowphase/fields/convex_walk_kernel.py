@@ -88,7 +88,7 @@ def _set_probe(walk, margin, frame, probe):
     m, h = scale(per_metre, sub(c, vec3_at(tree.numbers, CENTRE))), scale(per_metre, vec3_at(box, 3))
     wider = per_metre * (margin + walk.slack)
     size = 4.0 + norm1(m) + norm1(h) + wider
-    off = off_rotation(view_f64(walk.words[POSES_AT] + 8 * POSE, POSE))
+    off = off_rotation(view_f64(walk.words[POSES_AT] + 8 * POSE, POSE), 0)
     wider += (_FLOAT_ROUNDING + 2.0 * off) * size
     if not (size + wider) * (2.0 + off) < _LARGEST:  # 2 + off is more than the length of an axis
         return -1.0
@@ -256,7 +256,7 @@ def _state_by_centre(walk, margin):
     radii = numbers[RADIUS] + numbers[NUMBERS + RADIUS] + margin
     slop = numbers[NUMBERS + SLOP] + poses[POSE_SLOP] + poses[POSE + POSE_SLOP]
     stack = view_i64(walk.words[STACK_AT], WIDTH * (MAX_LEVELS + 1))
-    state = state_of_balls(walk.tree, poses, centre, radii, slop, off_rotation(poses), stack)
+    state = state_of_balls(walk.tree, poses, centre, radii, slop, off_rotation(poses, 0), stack)
     if state == OPEN:
         return LONG_WAY
     return SURFACES_APART if state != BALLS_MEET else NEAR if margin > 0.0 else MEETS

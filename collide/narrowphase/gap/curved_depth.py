@@ -50,6 +50,7 @@ from collide.narrowphase.gjk.minkowski_difference import point_at
 from collide.narrowphase.shallow_ellipsoids import rolling_radius
 from collide.numerics import double_double as dd
 from collide.numerics.double_double import DD
+from collide.numerics.rigid_poses import off_rotation
 from collide.numerics.vec3 import Vec3, cross, divide, dot, norm, scale, sub, unit_orthogonal
 
 #: How near to a flat feature, in radians, a direction of EPA is for that feature to be taken.
@@ -172,15 +173,8 @@ def _depth_of_point(pair, body, x, unit):
             inner = _less(_inset(radius, aside), _inset(half, p.z))
         else:
             inner = _less(_inset_of_side(radius, half, aside, p.z), dd.add(DD(half, 0.0), p.z))
-    x, y, z = _column(poses, pose_at, 0), _column(poses, pose_at, 1), _column(poses, pose_at, 2)
-    off = max(max(abs(dot(x, x) - 1.0), abs(dot(y, y) - 1.0)), abs(dot(z, z) - 1.0))
-    off = 3.0 * (max(max(off, abs(dot(x, y))), max(abs(dot(y, z)), abs(dot(z, x)))) + 2.0**-51)
+    off = 3.0 * off_rotation(poses, pose_at)
     return dd.sub(inner, DD(_SLACK * (off * abs(inner.high) + miss), 0.0))
-
-
-@kernel(inline=True)
-def _column(poses, at, axis):
-    return Vec3(poses[at + axis], poses[at + axis + 3], poses[at + axis + 6])
 
 
 @kernel(inline=True)
