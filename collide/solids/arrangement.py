@@ -17,6 +17,7 @@ from collide.solids.around_edges import Sheets
 from collide.solids.cells import Cells, cells_of, merged_sheets
 from collide.solids.crossing_pairs import crossing_pairs
 from collide.solids.cut_points import CutPoints, axis_of
+from collide.solids.cut_segments import cut_segments
 from collide.solids.facet_cuts import FacetCuts, segment
 from collide.solids.limits import BYTES_PER_PAIR, UNLIMITED, Limits
 from collide.solids.placed_facets import Operand, PlacedFacets
@@ -60,18 +61,17 @@ def arrange(operands: list[Operand], limits: Limits = UNLIMITED) -> Arrangement:
     facets = PlacedFacets(operands)
     points = CutPoints(facets)
     pairs = meeting_pairs(facets)
-    crossings, ids, is_clear, exactly = _clear_crossings(facets, points, pairs)
+    crossings, is_clear, exactly = _clear_crossings(facets, pairs)
+    segments = cut_segments(facets, points, crossings, exactly)
     by_paths = np.zeros(len(facets.corners), dtype=bool)
     by_paths[crossings.pairs] = True
     by_paths &= ~exactly
-    triangles, of_triangle, rest = split_facets(facets, crossings, ids, np.flatnonzero(by_paths))
+    triangles, of_triangle, rest = split_facets(facets, segments, np.flatnonzero(by_paths))
     exactly[rest] = True
-    drawn = exactly[crossings.pairs].any(axis=1)
     unclear = pairs[~is_clear]
-    n_exact = len(unclear) + int(drawn.sum())
+    n_exact = len(unclear) + int(exactly[crossings.pairs].any(axis=1).sum())
     limits.check_memory(BYTES_PER_PAIR * n_exact, f"{n_exact:,} pairs of facets to be cut exactly")
-    rows = np.flatnonzero(exactly)
-    cuts = FacetCuts(facets, points, unclear, crossings.pairs[drawn], ids[drawn], rows, limits)
+    cuts = FacetCuts(facets, points, unclear, segments, np.flatnonzero(exactly), limits)
     pieces, of = [], []
     for f in limits.watched("cutting facets", sorted(cuts.corners_of)):
         made = cut_facet(cuts, f)
@@ -84,55 +84,27 @@ def arrange(operands: list[Operand], limits: Limits = UNLIMITED) -> Arrangement:
     merged = merged_sheets(np.array(pieces, dtype=np.int64).reshape(-1, 3), of_piece, body, len(operands))
     sheets = _all_sheets(facets, np.flatnonzero(~is_cut), triangles, of_triangle, merged)
     limits.stage("telling cells apart")
-    cells = cells_of(sheets, points, is_cut, crossings.pairs, ids)
+    cells = cells_of(sheets, points, is_cut, *segments.ordered())
     return Arrangement(facets, points, sheets, cells, len(pairs), int(is_cut.sum()))
 
 
-def _clear_crossings(facets: PlacedFacets, points: CutPoints, pairs: np.ndarray):
-    """(clear crossings of two bodies, ids (k, 2) of their ends, (k,) bool: pairs with a clear crossing, (F,) bool:
-    facets to be cut exactly).
+def _clear_crossings(facets: PlacedFacets, pairs: np.ndarray):
+    """(clear crossings of two bodies, (k,) bool: pairs with a clear crossing, (F,) bool: facets to be cut exactly).
 
-    Two ends are a single point if the same edge pierces the same facet: a rule for facets of two bodies. Facets
-    crossing their own body's, their neighbours in such crossings, and facets meeting two other bodies, are cut exactly.
-    A point on facets of three bodies is on facets that meet, so each of them meets two other bodies.
+    Facets crossing their own body's, and their neighbours in such crossings, are cut exactly.
     """
     of_one = facets.body[pairs[:, 0]] == facets.body[pairs[:, 1]]
     crossings, proven = crossing_pairs(facets, pairs[~of_one])
     exactly = np.zeros(len(facets.corners), dtype=bool)
-    if len(facets.operands) > 2:
-        exactly[_of_three_bodies(facets, pairs)] = True
     exactly[pairs[of_one]] = True
     exactly[pairs[exactly[pairs].any(axis=1)]] = True
     exactly[pairs[~of_one][~proven]] = True
     rows = np.unique(crossings.pairs)
     two_sided = facets.beside(facets.edge[rows].ravel())[:, 0].reshape(-1, 3) >= 0
     exactly[rows[~two_sided.all(axis=1)]] = True
-    keys, first, ends = np.unique(
-        crossings.edge * len(facets.corners) + crossings.facet, return_index=True, return_inverse=True
-    )
-    del keys
-    pair, end = first // 2, first % 2
-    facet = crossings.facet[pair, end]
-    edge = crossings.edge[pair, end]
-    owner = crossings.pairs[pair].sum(axis=1) - facet
-    slot = np.argmax(facets.edge[owner] == edge[:, None], axis=1)
-    corners = facets.corners[owner]
-    k = np.arange(len(owner))
-    start = len(points)
-    points.add_piercings(np.stack([corners[k, slot], corners[k, (slot + 1) % 3]], axis=1), facet)
     is_clear = ~of_one
     is_clear[is_clear] = proven
-    return crossings, start + ends.reshape(-1, 2), is_clear, exactly
-
-
-def _of_three_bodies(facets: PlacedFacets, pairs: np.ndarray) -> np.ndarray:
-    """(k,) rows of facets that meet facets of two other bodies or more."""
-    rows, met = pairs.ravel(), facets.body[pairs[:, ::-1].ravel()]
-    lowest = np.full(len(facets.corners), len(facets.operands))
-    highest = np.full(len(facets.corners), -1)
-    np.minimum.at(lowest, rows, met)
-    np.maximum.at(highest, rows, met)
-    return np.flatnonzero(lowest < highest)
+    return crossings, is_clear, exactly
 
 
 def _all_sheets(

@@ -14,7 +14,7 @@ from functools import cmp_to_key
 import numpy as np
 
 from collide.numerics.exact_points import Point
-from collide.numerics.exact_vectors import inner, minus
+from collide.numerics.exact_vectors import inner
 from collide.solids.placed_facets import PlacedFacets, quotient
 
 Rational = tuple[int, int, int, int]
@@ -34,6 +34,7 @@ class CutPoints:
         self._near: dict[int, tuple[float, float, float]] = {}
         self.same_as: dict[int, int] = {}
         self.pierced = np.zeros((0, 3), dtype=np.int64)
+        self.crossed = np.zeros((0, 3), dtype=np.int64)
         self._next = self.n_vertices
 
     def __len__(self) -> int:
@@ -50,30 +51,43 @@ class CutPoints:
                 self._exact[vertex] = (x, y, z, 1)
         return known
 
-    def add_piercings(self, edges: np.ndarray, rows: np.ndarray) -> None:
-        """Points for the first ids after those of vertices, asked once: where edges (k, 2) of vertices go through
-        facets (k,). They are worked out when asked for.
+    def add_piercings(self, edges: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """Ids (k,) of points where edges (k, 2) of vertices go through facets (k,), asked once, before all other new
+        points. They are worked out when asked for.
         """
         self.pierced = np.column_stack([edges, rows])
-        self._next += len(rows)
+        return self._numbered(len(rows))
 
-    def piercing(self, point: int) -> list[int]:
-        """The ends of the edge and the facet of such a point; of all others nothing."""
-        row = point - self.n_vertices
-        return self.pierced[row].tolist() if 0 <= row < len(self.pierced) else []
+    def add_crossings(self, crossed: np.ndarray) -> np.ndarray:
+        """Ids (k,) of points where segments go through facets, asked once, after `add_piercings`.
+
+        crossed : (k, 3) ids of a segment's ends, which are piercing points, and the facet.
+        """
+        self.crossed = crossed
+        return self._numbered(len(crossed))
+
+    def _numbered(self, k: int) -> np.ndarray:
+        self._next += k
+        return np.arange(self._next - k, self._next)
+
+    def kinds(self, ids: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(k,) bool each: vertices, piercing points and crossings among points."""
+        first, second = self.n_vertices, self.n_vertices + len(self.pierced)
+        return ids < first, (ids >= first) & (ids < second), (ids >= second) & (ids < second + len(self.crossed))
 
     def place_of(self, point: int) -> int:
         """The id of the place of a cut point; later points with the same coordinates get the same id."""
         self._exact[point] = reduced(*self.exact(point))
         return self._ids.setdefault(self._exact[point], point)
 
-    def _pierce(self, p: int, q: int, row: int) -> Rational:
-        """Where the edge from vertex p to vertex q goes through a facet's plane."""
-        a, b = self.facets.exact(p), self.facets.exact(q)
+    def _through(self, a: Rational, b: Rational, row: int) -> Rational:
+        """Where the segment from a to b goes through a facet's plane."""
         n, start = self.facets.normal(row), self.facets.exact(int(self.facets.corners[row, 0]))
-        above, below = abs(inner(n, minus(a, start))), abs(inner(n, minus(b, start)))
-        x, y, z = (u * below + v * above for u, v in zip(a, b))
-        return x, y, z, above + below
+        height = inner(n, start)
+        above, below = (abs(inner(n, p[:3]) - height * p[3]) for p in (a, b))
+        # Weights of homogeneous points: |below| and |above| meet in the plane.
+        x, y, z, w = (p * below + q * above for p, q in zip(a, b))
+        return x, y, z, w
 
     def add(self, point: Rational) -> int:
         """The id of a point, which has no common factor."""
@@ -85,17 +99,31 @@ class CutPoints:
         return known
 
     def exact(self, point: int) -> Rational:
-        if point not in self._exact:
-            piercing = self.piercing(point)
-            self._exact[point] = self._pierce(*piercing) if piercing else (*self.facets.exact(point), 1)
-        return self._exact[point]
+        known = self._exact.get(point)
+        if known is None:
+            known = self._exact[point] = self._worked_out(point)
+        return known
+
+    def _worked_out(self, point: int) -> Rational:
+        row = point - self.n_vertices
+        if row < 0:
+            return (*self.facets.exact(point), 1)
+        if row < len(self.pierced):
+            p, q, facet = self.pierced[row].tolist()
+            return self._through((*self.facets.exact(p), 1), (*self.facets.exact(q), 1), facet)
+        p, q, facet = self.crossed[row - len(self.pierced)].tolist()
+        return reduced(*self._through(self.exact(p), self.exact(q), facet))
 
     def load(self, some: Iterable[int]) -> None:
         """Work out the vertices behind points, all at once: quicker than each alone."""
         ids = np.array(list(some), dtype=np.int64)
-        rows = ids[(ids >= self.n_vertices) & (ids < self.n_vertices + len(self.pierced))] - self.n_vertices
-        vertices = [ids[ids < self.n_vertices], self.pierced[rows, :2].ravel()]
-        vertices.append(self.facets.corners[self.pierced[rows, 2]].ravel())
+        _, _, is_crossing = self.kinds(ids)
+        crossed = self.crossed[ids[is_crossing] - self.n_vertices - len(self.pierced)]
+        ids = np.concatenate([ids, crossed[:, :2].ravel()])
+        is_vertex, is_piercing, _ = self.kinds(ids)
+        pierced = self.pierced[ids[is_piercing] - self.n_vertices]
+        facets = np.concatenate([pierced[:, 2], crossed[:, 2]])
+        vertices = [ids[is_vertex], pierced[:, :2].ravel(), self.facets.corners[facets].ravel()]
         self.facets.load(np.unique(np.concatenate(vertices)).tolist())
 
     def near(self, point: int) -> tuple[float, float, float]:

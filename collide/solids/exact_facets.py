@@ -16,6 +16,7 @@ from collide.shapes.mesh import Mesh
 from collide.solids.arrangement import Arrangement, cut_facet
 from collide.solids.cells import cells_of, merged_sheets
 from collide.solids.cut_points import CutPoints
+from collide.solids.cut_segments import NO_SEGMENTS
 from collide.solids.facet_cuts import FacetCuts
 from collide.solids.facet_edges import FacetEdges
 from collide.solids.limits import BYTES_PER_PAIR, UNLIMITED, Limits
@@ -78,9 +79,8 @@ def arrangement_of_facets(facets: ExactFacets, limits: Limits = UNLIMITED) -> Ar
     limits.stage("finding facets that meet")
     pairs = close_pairs(facets)
     limits.check_memory(BYTES_PER_PAIR * len(pairs), f"{len(pairs):,} pairs of facets to be cut exactly")
-    nothing = np.zeros((0, 2), dtype=np.int64)
     rows = np.arange(len(facets.corners))
-    cuts = _Cuts(facets, points, pairs, nothing, nothing, rows, limits)
+    cuts = _Cuts(facets, points, pairs, NO_SEGMENTS, rows, limits)
     pieces, of = [], []
     for f in limits.watched("cutting facets", rows.tolist()):
         made = cut_facet(cuts, f)
@@ -90,7 +90,7 @@ def arrangement_of_facets(facets: ExactFacets, limits: Limits = UNLIMITED) -> Ar
     sheets = merged_sheets(np.array(pieces, dtype=np.int64), of_piece, np.zeros_like(of_piece), 1)
     limits.stage("telling cells apart")
     is_cut = np.ones(len(rows), dtype=bool)
-    cells = cells_of(sheets, points, is_cut, nothing, nothing)
+    cells = cells_of(sheets, points, is_cut, *NO_SEGMENTS.ordered())
     return Arrangement(facets, points, sheets, cells, len(pairs), len(rows))
 
 

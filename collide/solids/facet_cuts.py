@@ -13,6 +13,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from collide.solids.cut_points import CutPoints, Rational, axis_of, reduced
+from collide.solids.cut_segments import CutSegments
 from collide.solids.limits import UNLIMITED, Limits
 from collide.solids.placed_facets import PlacedFacets
 from collide.surface_queries.overlay import common_piece
@@ -24,15 +25,15 @@ class FacetCuts:
     """The segments of cut facets.
 
     pairs : (k, 2) rows of meeting facets, each pair once, without neighbours that share corners and edges alone.
-    crossings : (k, 2) clearly crossing pairs, and ids : (k, 2) of the ends of their common segments.
-    rows : facets to cut; of pairs both, of crossings at least a facet.
+    segments : common segments of clearly crossing pairs, drawn on the facets to cut among them.
+    rows : facets to cut; of pairs both.
     corners_of : ids of a facet's corners.   sides_of : the three segments of its border.
     segments_of, points_of : segments and points on a facet, its border among them.   splits : points within a segment.
     """
 
     def __init__(
-        self, facets: PlacedFacets, points: CutPoints, pairs: np.ndarray, crossings: np.ndarray, ids: np.ndarray,
-        rows: np.ndarray, limits: Limits = UNLIMITED,
+        self, facets: PlacedFacets, points: CutPoints, pairs: np.ndarray, segments: CutSegments, rows: np.ndarray,
+        limits: Limits = UNLIMITED,
     ):
         self.facets, self.points = facets, points
         self.corners_of: dict[int, tuple[int, int, int]] = {}
@@ -43,13 +44,15 @@ class FacetCuts:
         self._pieces: dict[int, dict[int, list[Segment]]] = defaultdict(dict)
         self._changed: set[int] = set()
         self._meets: dict[int, set[int]] = defaultdict(set)
-        some = np.unique(crossings) if len(rows) else rows
-        of_rows = facets.corners[np.union1d(rows, some)]
+        crossings, ids, triples = segments.on_facets(rows, len(facets.corners))
+        of_rows = facets.corners[np.union1d(rows, crossings)]
         facets.load(np.unique(np.concatenate([of_rows.ravel(), facets.thin.ravel()])).tolist())
         for f in rows.tolist():
             self._start(f)
         for f, g, p, q in np.column_stack([crossings, ids]).tolist():
             self._put_piece(f, g, [points.place_of(p), points.place_of(q)])
+        for f, g, h, p in triples.tolist():
+            self._put_crossing((f, g, h), points.place_of(p))
         for f, g in limits.watched("drawing what facets share", pairs.tolist()):
             self._draw(f, g)
         for f in limits.watched("crossing segments", self._pieces):
@@ -100,8 +103,17 @@ class FacetCuts:
             for s in segments:
                 self._put_segment(a, s)
 
+    def _put_crossing(self, three: tuple[int, int, int], point: int) -> None:
+        """Split the common segments of three facets, on those to be cut among them, at their common point."""
+        for f in three:
+            for g in three:
+                for s in self._pieces[f].get(g, ()) if f in self.corners_of else ():
+                    self._split(s, point)
+
     def _cross_segments(self, f: int) -> None:
-        """Split crossing segments drawn by facets that meet each other: any other segments share ends at most."""
+        """Split crossing segments drawn by facets that meet each other: any other segments share ends, or are split
+        where they cross.
+        """
         pieces = self._pieces[f]
         _, u, v = axis_of(self.facets.normal(f))
         for g, drawn in pieces.items():

@@ -82,14 +82,21 @@ def _best_ear(seen, m, limit):
 
 
 @kernel
+def area_limit(size, error):
+    """A bound of the errors of twice the areas of points whose coordinates differ by ``size`` at most.
+
+    Differences are off by 2E + 2u of themselves: determinants by 4 D (2 E + 2 u D) and 4 u D².
+    """
+    return 16.0 * size * (error + 2.0 * _U * size) + 1e-300
+
+
+@kernel
 def clip_polygon(ids, m, seen, error, triangles, count):
     """Append the triangles of a polygon; returns the number of triangles after, −1 where an ear is not proven."""
     size = 0.0
     for k in range(m):
         size = max(size, abs(seen[2 * k] - seen[0]), abs(seen[2 * k + 1] - seen[1]))
-    size = 2.0 * size
-    # Differences are off by 2E + 2u of themselves: determinants by 4 D (2 E + 2 u D) and 4 u D².
-    limit = 16.0 * size * (error + 2.0 * _U * size) + 1e-300
+    limit = area_limit(2.0 * size, error)
     while m > 2:
         j = _best_ear(seen, m, limit)
         if j < 0:

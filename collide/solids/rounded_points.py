@@ -7,18 +7,23 @@ import numpy as np
 from collide.kernels import address_of
 from collide.solids.cut_points import CutPoints
 from collide.solids.placed_facets import PlacedFacets
-from collide.solids.point_kernels import round_piercings, round_vertices
+from collide.solids.point_kernels import round_crossings, round_piercings, round_vertices
 
 
 def rounded_points(points: CutPoints, ids: np.ndarray) -> tuple[np.ndarray, float]:
     """((k, 3) points in W, each rounded once, the farthest a point was moved [m])."""
     facets = points.facets
     places, off, proven = np.empty((len(ids), 3)), np.zeros(len(ids)), np.zeros(len(ids), dtype=bool)
-    is_vertex = ids < points.n_vertices
-    rows = np.flatnonzero(is_vertex)
-    places[rows], off[rows], proven[rows] = rounded_vertices(facets, ids[rows])
-    rows = np.flatnonzero(~is_vertex & (ids < points.n_vertices + len(points.pierced)))
-    places[rows], off[rows], proven[rows] = _rounded_piercings(facets, points.pierced[ids[rows] - points.n_vertices])
+    kinds = points.kinds(ids)
+    pierced = np.concatenate([points.pierced[:, :2], facets.corners[points.pierced[:, 2]]], axis=1)
+    start, stop, facet = points.crossed.T
+    crossed = [pierced[start - points.n_vertices], pierced[stop - points.n_vertices], facets.corners[facet]]
+    bases = 0, points.n_vertices, points.n_vertices + len(pierced)
+    kernels = round_vertices, round_piercings, round_crossings
+    named = np.arange(points.n_vertices)[:, None], pierced, np.concatenate(crossed, axis=1)
+    for is_kind, first, kernel, vertices in zip(kinds, bases, kernels, named):
+        rows = np.flatnonzero(is_kind)
+        places[rows], off[rows], proven[rows] = _rounded(facets, kernel, vertices[ids[rows] - first])
     remaining = np.flatnonzero(~proven)
     points.load(ids[remaining])
     for row, point in zip(remaining.tolist(), ids[remaining].tolist()):
@@ -29,26 +34,16 @@ def rounded_points(points: CutPoints, ids: np.ndarray) -> tuple[np.ndarray, floa
 
 def rounded_vertices(facets: PlacedFacets, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """((k, 3) vertices in W rounded to doubles, (k,) how far that is off at most, (k,) bool: proven nearest)."""
-    rows = np.ascontiguousarray(rows, dtype=np.int64)
-    answers = _answers(len(rows))
-    round_vertices(*_bodies(facets), address_of(rows), len(rows), *map(address_of, answers))
-    return *answers[:2], answers[2].view(bool)
+    return _rounded(facets, round_vertices, rows)
 
 
-def _rounded_piercings(facets: PlacedFacets, pierced: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The same of the points in which edges go through facets.   pierced : (k, 3), two vertices and the facet."""
-    vertices = np.ascontiguousarray(np.concatenate([pierced[:, :2], facets.corners[pierced[:, 2]]], axis=1))
-    answers = _answers(len(pierced))
-    round_piercings(*_bodies(facets), address_of(vertices), len(pierced), *map(address_of, answers))
-    return *answers[:2], answers[2].view(bool)
-
-
-def _bodies(facets: PlacedFacets) -> tuple[int, ...]:
-    return (
+def _rounded(facets: PlacedFacets, kernel, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """As `rounded_vertices`, of the points that a kernel makes of vertices (k, …)."""
+    vertices = np.ascontiguousarray(vertices, dtype=np.int64)
+    k = len(vertices)
+    places, off, proven = np.empty((k, 3)), np.empty(k), np.empty(k, dtype=np.uint8)
+    kernel(
         address_of(facets.poses), len(facets.poses), address_of(facets.local), address_of(facets.body_of),
-        len(facets.local),
+        len(facets.local), address_of(vertices), k, address_of(places), address_of(off), address_of(proven),
     )
-
-
-def _answers(k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    return np.empty((k, 3)), np.empty(k), np.empty(k, dtype=np.uint8)
+    return places, off, proven.view(bool)

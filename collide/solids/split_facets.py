@@ -1,8 +1,9 @@
 """Facets cut by paths of clear crossings, split all at once: around every part, then into triangles.
 
 A path enters a facet through its border, turns where edges of others pierce the facet, and leaves through the border.
-No angle has to be compared: at a point of the border the way around a part turns inwards, at a point inside the way
-goes on along the path. Facets with a step unproven in doubles, or with a ring of cuts, are left to the exact sweep.
+Paths of different bodies may cross. No angle has to be compared: at a point of the border the way around a part turns
+inwards, where an edge pierces the facet the way goes on along the path, and where two paths cross the way turns left.
+Facets with a step unproven in doubles, or with a ring of cuts, are left to the exact sweep.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.kernels import address_of
-from collide.solids.crossing_pairs import CrossingPairs
+from collide.solids.cut_segments import CutSegments
 from collide.solids.placed_facets import PlacedFacets
 from collide.solids.polygon_ears import WORKSPACE, clip_parts
 
@@ -31,38 +32,54 @@ class _Chains(NamedTuple):
 
 
 def split_facets(
-    facets: PlacedFacets, crossings: CrossingPairs, ids: np.ndarray, rows: np.ndarray
+    facets: PlacedFacets, cuts: CutSegments, rows: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(triangles (t, 3) of point ids with the fronts of facets, facet (t,), facets that are left (k,)).
 
-    ids : (k, 2) of the crossings' ends, from the number of vertices on.   rows : facets cut by these crossings alone.
+    rows : facets cut by these segments alone.
     """
-    n_vertices = len(facets.local)
-    n_points = int(ids.max(initial=n_vertices - 1)) + 1
-    place, error = np.zeros((n_points - n_vertices, 3)), np.zeros(n_points - n_vertices)
-    place[ids - n_vertices] = crossings.place
-    np.maximum.at(error, (ids - n_vertices).ravel(), np.repeat(crossings.error, 2))
+    n_points = len(facets.local) + len(cuts.place)
     wanted = np.zeros(len(facets.corners), dtype=bool)
     wanted[rows] = True
-    # Every crossing lies on two facets and runs along it both ways.
-    facet = np.concatenate([crossings.pairs[:, 0], crossings.pairs[:, 1]])
-    ends, pierced = np.tile(ids, (2, 1)), np.tile(crossings.facet, (2, 1))
+    # Every segment lies on two facets and is walked along both ways: four half-edges, of each facet and way.
+    facet = np.tile(cuts.pairs.T.ravel(), 2)
     mine = wanted[facet]
-    facet, ends, pierced = facet[mine], ends[mine], pierced[mine]
-    edge = np.tile(crossings.edge, (2, 1))[mine]
-    facet = np.concatenate([facet, facet])
-    start, end = np.concatenate([ends, ends[:, ::-1]]).T
-    at_border = np.concatenate([pierced, pierced[:, ::-1]]).T != facet
-    edge = np.concatenate([edge[:, 0], edge[:, 1]])
-    chains, bad = _borders(facets, rows, facet, start, edge, at_border[0], place, error)
-    following, unpaired = _ways_around(chains, facet, start, end, at_border, n_points)
+    number = np.cumsum(mine) - 1
+    turns = cuts.turns[wanted[cuts.turns[:, 0]]]
+    turned = [number[half_edges] for half_edges in _turns(cuts, turns)]
+    facet = facet[mine]
+    both = np.concatenate([cuts.ids] * 2 + [cuts.ids[:, ::-1]] * 2)[mine]
+    edge = np.concatenate([cuts.edge[:, 0]] * 2 + [cuts.edge[:, 1]] * 2)[mine]
+    pierced = np.concatenate([cuts.pierced] * 2 + [cuts.pierced[:, ::-1]] * 2)[mine]
+    at_border = ((pierced >= 0) & (pierced != facet[:, None])).T
+    start, end = both.T
+    chains, bad = _borders(facets, rows, facet, start, edge, at_border[0], cuts.place, cuts.error)
+    following, unpaired = _ways_around(chains, facet, start, end, at_border, turned, n_points)
     bad = np.union1d(bad, unpaired)
     steps = np.concatenate([chains.facet, facet]), np.concatenate([chains.point, start])
     is_bad = np.zeros(len(facets.corners), dtype=bool)
     is_bad[bad] = True
-    triangles, owners = _clipped(facets, following, len(chains.facet), *steps, place, error, is_bad)
+    triangles, owners = _clipped(facets, following, len(chains.facet), *steps, cuts.place, cuts.error, is_bad)
     remaining = ~is_bad[owners]
     return triangles[remaining], owners[remaining], rows[is_bad[rows]]
+
+
+def _turns(cuts: CutSegments, turns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(half-edges up to the crossing of two paths, of each the next half-edge, on the left)."""
+    m = len(cuts.pairs)
+    facet, first, second, sign = turns.T
+
+    def half_edge(piece: np.ndarray, backward: bool) -> np.ndarray:
+        return piece + m * (cuts.pairs[piece, 1] == facet) + 2 * m * backward
+
+    # Ahead and behind along both segments, arriving and leaving; the second crosses the first from right to left.
+    to_left = np.where(sign > 0, half_edge(second + 1, False), half_edge(second, True))
+    to_right = np.where(sign > 0, half_edge(second, True), half_edge(second + 1, False))
+    from_right = np.where(sign > 0, half_edge(second, False), half_edge(second + 1, True))
+    from_left = np.where(sign > 0, half_edge(second + 1, True), half_edge(second, False))
+    ahead, back = half_edge(first + 1, False), half_edge(first, True)
+    arriving = [half_edge(first, False), half_edge(first + 1, True), from_right, from_left]
+    return np.concatenate(arriving), np.concatenate([to_left, to_right, back, ahead])
 
 
 def _clipped(
@@ -116,7 +133,7 @@ def _posed_corners(T: np.ndarray, X: np.ndarray) -> tuple[np.ndarray, np.ndarray
     return terms.sum(axis=3) + shift, 6.0 * 2.0**-53 * size.max(axis=(1, 2))
 
 
-def _ways_around(chains: _Chains, facet, start, end, at_border, n_points) -> tuple[np.ndarray, np.ndarray]:
+def _ways_around(chains: _Chains, facet, start, end, at_border, turned, n_points) -> tuple[np.ndarray, np.ndarray]:
     """(after each step of the borders, then of the segments, the next around the same part; facets where none fits)."""
     m, n = len(chains.facet), len(facet)
     keys = facet * n_points + start
@@ -136,7 +153,8 @@ def _ways_around(chains: _Chains, facet, start, end, at_border, n_points) -> tup
     on_border = ~chains.is_corner[then]
     following[:m] = np.where(on_border, m + order[np.minimum(first, n - 1)] if n else 0, then)
     bad = [chains.facet[on_border & (count != 1)]]
-    # Segments ending on the border continue along the border, segments ending inside along the path, never back.
+    # Segments ending on the border continue along the border, where paths cross they turn, and others continue along
+    # the path, never back.
     border_keys = chains.facet * n_points + chains.point
     border_order = np.argsort(border_keys, kind="stable")
     at = np.searchsorted(border_keys[border_order], facet * n_points + end)
@@ -145,5 +163,8 @@ def _ways_around(chains: _Chains, facet, start, end, at_border, n_points) -> tup
     onto, or_onto = order[np.minimum(first, n - 1)], order[np.minimum(first + 1, n - 1)]
     back = (np.arange(n) + n // 2) % n if n else onto
     following[m:] = np.where(at_border[1], onward, m + np.where(onto == back, or_onto, onto))
-    bad.append(facet[~at_border[1] & (count != 2)])
+    following[m + turned[0]] = m + turned[1]
+    turns = np.zeros(n, dtype=bool)
+    turns[turned[0]] = True
+    bad.append(facet[~at_border[1] & ~turns & (count != 2)])
     return following, np.unique(np.concatenate(bad))

@@ -113,13 +113,14 @@ def _ends(corners, heights, limit, error):
     a, b, c = corners
     s, t, u = heights
     largest = max(max_abs(a), max_abs(b), max_abs(c))
-    p, off_p = _end(a, s, b, t, limit)
-    q, off_q = _end(a, s, c, u, limit)
+    p, off_p = end_of_segment(a, s, b, t, limit)
+    q, off_q = end_of_segment(a, s, c, u, limit)
     return p, q, max(off_p + 4.0 * error + 4.0 * _U * largest, off_q + 4.0 * error + 4.0 * _U * largest)
 
 
 @kernel
-def _end(a, s, b, t, limit):
+def end_of_segment(a, s, b, t, limit):
+    """(where a segment from a to b, of heights s and t off by ``limit``, has height 0, a bound of the error)."""
     edge = sub(b, a)
     slope = abs(s - t)
     if not slope > 4.0 * limit:
