@@ -25,8 +25,8 @@ from collide.narrowphase.exact_curved.integer_bodies import (
     opposite,
 )
 
-#: Digits of the rounds, and how many supports each takes.
-_DIGITS, _ROUNDS = (40, 80, 160), 160
+#: Supports for each number of digits: a rim at a pole gains a digit in ten supports.
+_ROUNDS = {40: 160, 80: 500, 160: 1500}
 _ZERO, _ASIDE = Decimal(0), Decimal(2) ** -26
 Point = tuple[Decimal, Decimal, Decimal]
 
@@ -40,7 +40,7 @@ class Proposal(NamedTuple):
 
 def search(A: IntegerBody, B: IntegerBody, n: Vector) -> Proposal:
     """n : a direction from A to B, to begin with."""
-    for digits in _DIGITS:
+    for digits in _ROUNDS:
         with localcontext(Context(prec=digits)):
             proposal = _search(A, B, n, digits)
         if proposal.point or proposal.normal:
@@ -55,7 +55,7 @@ def _search(A: IntegerBody, B: IntegerBody, n: Vector, digits: int) -> Proposal:
     if not any(v):
         v = (Decimal(1), _ZERO, _ZERO)
     pairs = list({(sides[0].support(_negative(u)), sides[1].support(u)) for u in _beside(v)})
-    for k in range(_ROUNDS):
+    for k in range(_ROUNDS[digits]):
         direction = _integers_of(v, digits)
         if is_apart_along(A, B, opposite(direction)):
             return Proposal(None, opposite(direction))

@@ -90,6 +90,15 @@ def test_three_equal_contacts_along_a_curve_are_found():
     assert r.hit and r.how == collide.results.EXACT and r.lower == r.upper == 0.0
 
 
+def test_a_rim_an_ulp_from_the_tip_of_a_long_ellipsoid_is_settled():
+    """The search gains a digit in ten supports here, and gave up after 160."""
+    X_WA = np.array([[0, 1, 0, 1.0625], [0, 0, -1, 0.4375], [-1, 0, 0, -2.8125], [0, 0, 0, 1]])
+    X_WB = np.array([[0, -1, 0, 2.046875], [0, 0, 1, 1.96875], [-1, 0, 0, -1.5], [0, 0, 0, 1]])
+    X_WB[:3, 3] = np.nextafter(X_WB[:3, 3], (-np.inf, -np.inf, np.inf))
+    pair = Pair(collide.Cone(1.640625, 2.1875), collide.Ellipsoid((0.078125, 0.15625, 0.4375)), X_WA, X_WB, "tip")
+    assert answered(pair).hit
+
+
 RESTING = collide.Cylinder(0.25, 0.5), collide.Cone(0.25, 0.5), collide.Ellipsoid([0.5, 0.25, 0.25])
 
 
