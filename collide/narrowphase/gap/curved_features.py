@@ -480,9 +480,10 @@ def _within(pair, body, f, unit):
     s, t = f.s, f.t
     if f.kind == VERTEX and f.flat > 0:
         s, t = _clamped(s, 0.0, 1.0), _clamped(t, 0.0, 1.0)
-        total = s.high + t.high
-        if total > 1.0:
-            s, t = DD(s.high / total * (1.0 - 2.0**-50), 0.0), DD(t.high / total * (1.0 - 2.0**-50), 0.0)
+        total = dd.add(s, t)  # in doubles a sum of 1 may be rounded down from more, and the point is beyond the edge
+        if dd.less(DD(1.0, 0.0), total):
+            share = (1.0 - 2.0**-50) / total.high
+            s, t = DD(s.high * share, 0.0), DD(t.high * share, 0.0)
     elif f.kind == SIDE:
         half = unit * numbers[params + 1]
         s = _clamped(s, -half, half) if body.kind == CYLINDER else _clamped(s, 0.0, 1.0)

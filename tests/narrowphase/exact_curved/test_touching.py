@@ -99,6 +99,15 @@ def test_a_rim_an_ulp_from_the_tip_of_a_long_ellipsoid_is_settled():
     assert answered(pair).hit
 
 
+def test_a_tip_an_ulp_outside_a_corner_is_apart():
+    """A point of a facet was beyond its edge by 2⁻⁵⁴ of it, and a depth of 5e-18 was proven by that point."""
+    X_WA = np.array([[-1, 0, 0, -2.9375], [0, 1, 0, 1.9375], [0, 0, -1, 1.125], [0, 0, 0, 1]])
+    X_WB = np.array([[0, 0, 1, -3.3125], [1, 0, 0, 1.0], [0, 1, 0, -0.0625], [0, 0, 0, 1]])
+    X_WB[:3, 3] = np.nextafter(X_WB[:3, 3], (np.inf, -np.inf, np.inf))
+    r = answered(Pair(collide.Cone(0.9375, 1.25), collide.Box((1.875, 1.125, 0.75)), X_WA, X_WB, "corner"))
+    assert not r.hit and abs(r.lower - 8.465450562766818e-17) < 1e-25
+
+
 RESTING = collide.Cylinder(0.25, 0.5), collide.Cone(0.25, 0.5), collide.Ellipsoid([0.5, 0.25, 0.25])
 
 
