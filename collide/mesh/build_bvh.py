@@ -61,7 +61,8 @@ def build_mesh_tree(vertices: np.ndarray, faces: np.ndarray) -> MeshTree:
         address_of(triangles), address_of(ids), address_of(numbers), address_of(work), address_of(stack), len(stack),
         address_of(counts),
     )
-    return MeshTree(nodes[: counts[0]].copy(), triangles, ids, numbers[:3], int(numbers[3]), int(counts[1]))
+    nodes = nodes[: counts[0]].copy()
+    return MeshTree(nodes, triangles, ids, numbers[:3], int(numbers[3]), int(counts[1]), check=False)
 
 
 # Work: rows of eight slots, then bins (count, box low, box high), then areas from the right.

@@ -58,15 +58,20 @@ class MeshTree:
     address : of the header that kernels take; valid as long as this object lives.
     has_origins : whether boxes are relative to an origin of their node.
     content : digest of triangles and their numbers: it orders the bodies of a pair.
+
+    With ``check`` a structure that would lead kernels out of the arrays, as from a damaged file, is refused.
     """
 
-    def __init__(self, nodes, triangles, ids, centre, exponent: int, depth: int, has_origins: bool = False):
+    def __init__(
+        self, nodes, triangles, ids, centre, exponent: int, depth: int, has_origins: bool = False, check: bool = True
+    ):
         self.nodes = np.ascontiguousarray(nodes, dtype=np.int32)
         self.triangles = np.ascontiguousarray(triangles, dtype=np.float64)
         self.ids = np.ascontiguousarray(ids, dtype=np.int32)
         self.centre = np.array(centre, dtype=np.float64)
         self.exponent, self.depth, self.has_origins = int(exponent), int(depth), bool(has_origins)
-        self._check_structure()
+        if check:
+            self._check_structure()
         corners = np.abs(self.triangles).reshape(-1, 3)
         self.numbers = np.concatenate([self.centre, corners.max(axis=0), [self._radius()]])
         self.header = np.array(

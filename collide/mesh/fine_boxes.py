@@ -65,7 +65,7 @@ def with_origins(tree: MeshTree) -> MeshTree:
     words = nodes[:, 3 * WIDTH : 6 * WIDTH].reshape(-1, 3, WIDTH)[:, :, :4]
     words[:] = (words & ~0xFF) | numbers.astype("<i4").view(np.uint8).reshape(-1, 3, 4)
     nodes[:, 3 * WIDTH : 6 * WIDTH].reshape(-1, 3, WIDTH)[:, :, :4] = words
-    return MeshTree(nodes, tree.triangles, tree.ids, tree.centre, tree.exponent, tree.depth, has_origins=True)
+    return MeshTree(nodes, tree.triangles, tree.ids, tree.centre, tree.exponent, tree.depth, True, False)
 
 
 def _leaf_boxes(tree: MeshTree, nodes=slice(None)) -> tuple[np.ndarray, np.ndarray]:

@@ -23,7 +23,7 @@ def scaled_tree(tree: MeshTree, vertices: np.ndarray, faces: np.ndarray, factor:
     mantissa, exponent = math.frexp(factor)
     if mantissa == 0.5:
         centre, exponent = tree.centre * factor, tree.exponent + exponent - 1
-        return MeshTree(tree.nodes, triangles, tree.ids, centre, exponent, tree.depth, tree.has_origins)
+        return MeshTree(tree.nodes, triangles, tree.ids, centre, exponent, tree.depth, tree.has_origins, False)
     # Between 0.5 and 1: boxes stay within their unit.
     centre, unit = tree.centre * factor, math.ldexp(1.0, tree.exponent + exponent)
     slop = (np.abs(triangles).max() + np.abs(centre).max()) * 2.0**-51 / unit + 1e-37
@@ -34,5 +34,5 @@ def scaled_tree(tree: MeshTree, vertices: np.ndarray, faces: np.ndarray, factor:
     half_lengths = scaled[:, 1] * (1 + 2.0**-22) + np.abs(scaled[:, 0]) * 2.0**-22 + slop
     used = floats[:, 1] > NOTHING / 2
     floats[:, 1] = np.where(used, half_lengths, floats[:, 1])
-    scaled_copy = MeshTree(nodes, triangles, tree.ids, centre, tree.exponent + exponent, tree.depth)
+    scaled_copy = MeshTree(nodes, triangles, tree.ids, centre, tree.exponent + exponent, tree.depth, False, False)
     return with_origins(scaled_copy) if tree.has_origins else scaled_copy

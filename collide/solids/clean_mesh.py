@@ -62,8 +62,8 @@ def _sources_of(arrangement: Arrangement, triangles: np.ndarray, rows: np.ndarra
     facets: PlacedFacets = arrangement.facets
     turned = triangles[:, 0] != arrangement.sheets.triangles[rows, 0]
     some, plane = np.unique(2 * arrangement.sheets.facet[rows] + turned, return_inverse=True)
-    corners, _, _ = rounded_vertices(facets, facets.corners[some // 2].ravel())
-    corners = corners.reshape(-1, 3, 3)
+    ids, corners = used_points(facets.corners[some // 2], len(facets.local))
+    corners = rounded_vertices(facets, ids)[0][corners]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     size = np.sqrt((normals * normals).sum(axis=1)) * np.where(some % 2, -1.0, 1.0)
     normals /= np.where(size != 0.0, size, 1.0)[:, None]

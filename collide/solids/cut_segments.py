@@ -68,6 +68,8 @@ def cut_segments(
     """The pieces of clear crossings, with new points for their ends.   failed : (F,) bool, set for facets with an
     open sign.
     """
+    if not len(crossings.pairs):
+        return NO_SEGMENTS
     ends, place, error = _add_piercings(facets, points, crossings)
     meeting, where = _crossings_on_facets(facets, crossings, failed)
     others = crossings.pairs[meeting[:, 1:3]].sum(axis=2) - meeting[:, :1]

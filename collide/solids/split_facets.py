@@ -38,6 +38,8 @@ def split_facets(
 
     rows : facets cut by these segments alone.
     """
+    if not len(rows):
+        return np.zeros((0, 3), dtype=np.int64), rows, rows
     n_points = len(facets.local) + len(cuts.place)
     wanted = np.zeros(len(facets.corners), dtype=bool)
     wanted[rows] = True
@@ -120,8 +122,8 @@ def _borders(facets: PlacedFacets, rows, facet, start, edge, at_border, place, e
     with np.errstate(invalid="ignore"):
         tight = same & ~(height[1:] - height[:-1] > slack[1:] + slack[:-1])
     following = np.arange(1, len(at) + 1)
-    last = np.flatnonzero(np.append(at[1:] != at[:-1], True)) if len(at) else np.zeros(0, dtype=np.int64)
-    following[last] = np.append(0, last[:-1] + 1) if len(last) else last
+    last = np.flatnonzero(np.append(at[1:] != at[:-1], True))
+    following[last] = np.append(0, last[:-1] + 1)
     return _Chains(at, points, following, ~np.isfinite(height)), np.unique(at[1:][tight])
 
 
@@ -151,17 +153,17 @@ def _ways_around(chains: _Chains, facet, start, end, at_border, turned, n_points
     then = chains.following
     first, count = leaving(chains.facet, chains.point[then])
     on_border = ~chains.is_corner[then]
-    following[:m] = np.where(on_border, m + order[np.minimum(first, n - 1)] if n else 0, then)
+    following[:m] = np.where(on_border, m + order[np.minimum(first, n - 1)], then)
     bad = [chains.facet[on_border & (count != 1)]]
     # Segments ending on the border continue along the border, where paths cross they turn, and others continue along
     # the path, never back.
     border_keys = chains.facet * n_points + chains.point
     border_order = np.argsort(border_keys, kind="stable")
     at = np.searchsorted(border_keys[border_order], facet * n_points + end)
-    onward = border_order[np.minimum(at, m - 1)] if m else at
+    onward = border_order[np.minimum(at, m - 1)]
     first, count = leaving(facet, end)
     onto, or_onto = order[np.minimum(first, n - 1)], order[np.minimum(first + 1, n - 1)]
-    back = (np.arange(n) + n // 2) % n if n else onto
+    back = (np.arange(n) + n // 2) % n
     following[m:] = np.where(at_border[1], onward, m + np.where(onto == back, or_onto, onto))
     following[m + turned[0]] = m + turned[1]
     turns = np.zeros(n, dtype=bool)
