@@ -52,7 +52,6 @@ MODULES = {
         ),
     ),
 }
-_GROUPS = (("Guide", "users", "everybody", "readers"), ("Inside", "builders", "contributors"))
 
 
 def write_pages(root: Path) -> None:
@@ -227,19 +226,15 @@ class Links:
         return f"{match.group(1)}{Path(made).as_posix()}{match.group(4)}"
 
     def _tree(self) -> str:
-        """The pages that docs/index.md lists, in its order, under headings by whom they are for."""
+        """The pages that docs/index.md lists, in its order, under its headings."""
         index = (self._root / "docs" / "index.md").read_text(encoding="utf-8")
-        rows = re.findall(r"^\| \[[^\]]+\]\(([^)]+)\) \| ([^|]+) \|", index, flags=re.MULTILINE)
-        trees = []
-        for caption, *readers in _GROUPS:
-            pages = [
-                os.path.normpath(f"docs/{target}").replace(os.sep, "/").removesuffix(".md")
-                for target, reader in rows
-                if any(word in reader for word in readers)
-            ]
-            first = "docs/index" if caption == _GROUPS[0][0] else "benchmarks/README"
-            trees.append((caption, [first, *pages]))
-        trees.insert(1, ("Reference", [(MADE / "api" / "index").as_posix()]))
+        trees = [("Index", ["docs/index"])]
+        for caption, rows in re.findall(r"^## (.+)\n((?:.|\n(?!## ))*)", index, flags=re.MULTILINE):
+            targets = re.findall(r"^\| \[[^\]]+\]\(([^)]+)\) \|", rows, flags=re.MULTILINE)
+            pages = [os.path.normpath(f"docs/{target}").replace(os.sep, "/") for target in targets]
+            trees.append((caption, [page.removesuffix(".md") for page in pages]))
+        trees[-1][1].append("benchmarks/README")
+        trees.append(("Reference", [(MADE / "api" / "index").as_posix()]))
         return "".join(
             f"\n```{{toctree}}\n:hidden:\n:caption: {caption}\n\n" + "\n".join(pages) + "\n```\n"
             for caption, pages in trees

@@ -18,6 +18,16 @@ def _pages() -> list[Path]:
     return [*top, *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "benchmarks").glob("*.md"))]
 
 
+def test_the_readme_is_short():
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").split()) <= 1200
+
+
+def test_every_page_is_in_the_index():
+    index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
+    missing = [page.name for page in (ROOT / "docs").glob("*.md") if f"]({page.name})" not in index]
+    assert missing == ["index.md"], missing
+
+
 def test_links_between_pages_lead_somewhere():
     for page in _pages():
         for link in re.findall(r"\]\(([^)#\s]+)", page.read_text(encoding="utf-8")):
@@ -69,8 +79,8 @@ def test_pages_are_listed():
 
 
 def drawn() -> set[str]:
-    """Paths that the README's drawing of the house names: folders end with a slash."""
-    text = (ROOT / "README.md").read_text(encoding="utf-8").split("## The house")[1]
+    """Paths that the drawing of the house names: folders end with a slash."""
+    text = (ROOT / "docs" / "house.md").read_text(encoding="utf-8")
     block = re.findall(r"```text\n(.*?)```", text, flags=re.DOTALL)[1]
     paths, parents = set(), [""]
     for line in block.splitlines():
@@ -88,7 +98,7 @@ def drawn() -> set[str]:
 
 def test_drawing_names_what_exists():
     missing = [path for path in drawn() if "<" not in path and not (ROOT / path).exists()]
-    assert not missing, f"the README draws {missing}"
+    assert not missing, f"docs/house.md draws {missing}"
 
 
 def test_every_room_is_drawn():
@@ -96,7 +106,7 @@ def test_every_room_is_drawn():
     rooms = {room for room in rooms if "__pycache__" not in room and list((ROOT / room).glob("*.py"))}
     files = {f"collide/{path.name}" for path in (ROOT / "collide").glob("*.py")}
     missing = sorted((rooms | files) - drawn())
-    assert not missing, f"the README's drawing lacks {missing}"
+    assert not missing, f"docs/house.md lacks {missing}"
 
 
 def test_places_of_the_glossary_exist():

@@ -174,6 +174,7 @@ def test_every_example_is_known():
 #: What a page's Python takes as given: run before it, in a folder with the files of `_FILES`.
 GIVEN = {
     "README": "",
+    "python": "",
     "clouds": "",
     "voxels": "",
     "distance_fields": "",
