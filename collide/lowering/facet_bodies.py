@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,8 +26,11 @@ from collide.mesh.facet_reach import reach_of_facets
 from collide.mesh.mesh_survey import one_of_each_part
 from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
+from collide.shapes.primitives import Sphere
 from collide.shapes.shape import Shape, checked_shape, held_by, kept_with_shape
 from collide.shapes.swept_mesh import SweptMesh
+
+_ORIGIN = Sphere(1.0)
 
 
 class Body(NamedTuple):
@@ -93,6 +97,12 @@ def body_of(shape: Shape) -> Body:
     if isinstance(shape, SweptMesh):
         return _of_mesh(shape.mesh)._replace(of=held_by(shape, shape), radius=shape.radius)
     return _of_mesh(shape) if isinstance(shape, Mesh) else _of_convex(shape)
+
+
+@cache
+def origin_body() -> Body:
+    """The origin as a body: one facet without area."""
+    return body_of(_ORIGIN)
 
 
 def facet_body(shape, what: str) -> Body:

@@ -12,7 +12,7 @@ from naive_triangles import cross, inner, minus
 
 
 def exact_vector(values) -> list[Fraction]:
-    return [Fraction(float(x)) for x in values]
+    return [x if isinstance(x, Fraction) else Fraction(float(x)) for x in values]
 
 
 def square_to_triangle(point, triangle) -> Fraction:

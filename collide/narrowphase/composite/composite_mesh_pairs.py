@@ -2,7 +2,7 @@
 
 Exact poses are answered as for any pair. Where a product of two poses was rounded, a part stands within its slop of
 its rounded place: gaps wider than the slop are proven, and so are facets crossing each other by more, and points
-deeper inside. All else stays open.
+deeper inside. All else is left open here, for `facets/touching_facets.py`, where products are exact.
 """
 
 from __future__ import annotations

@@ -10,25 +10,25 @@ from __future__ import annotations
 
 import itertools
 import math
-from functools import cache
+from collections.abc import Callable
 
 import numpy as np
 
 from collide.base.poses_at import poses_at
-from collide.lowering.facet_bodies import Body, PosesWithSlop, body_of
+from collide.lowering.facet_bodies import PosesWithSlop, body_of, origin_body
 from collide.lowering.packed_convex import PackedConvex
 from collide.lowering.shape_table import ShapeTable
 from collide.narrowphase.composite.composite_mesh_pairs import part_rows, part_states
-from collide.narrowphase.composite.composite_parts import Balls, CompoundParts, boxes_near, compound_parts
+from collide.narrowphase.composite.composite_parts import Balls, CompoundParts, Part, boxes_near, compound_parts
 from collide.narrowphase.convex_batches import convex_hits, convex_rows
 from collide.narrowphase.convex_kernel_calls import leaving_touching_open, run_poses
 from collide.narrowphase.facets.facet_queries import points_in_solid, surface_distances
 from collide.narrowphase.facets.mesh_collide_kernel import APART, HIT, OPEN
 from collide.narrowphase.facets.separating_translation import SeparatingTranslation, shortened
+from collide.narrowphase.facets.touching_facets import PosedPart, settle_rows, settle_states
 from collide.narrowphase.facets.winding_numbers import INSIDE, OUTSIDE
 from collide.numerics.frames import frame_along
 from collide.results import EXACT, FIELDS, PAIR_DTYPE, UNDECIDED, flipped
-from collide.shapes.primitives import Sphere
 from collide.shapes.shape import Shape
 
 #: Pairs of parts that trial booleans of a depth search ask about before boxes of all parts are made.
@@ -41,7 +41,6 @@ _AT_ONE_MESH = 4
 _MAX_MESHES = 8
 #: Gaps of boxes of so many pairs of parts are worked out one and all; a walk through both trees takes as long.
 _MAX_TABLE = 1 << 12
-_POINT = Sphere(1.0)
 
 
 def compound_states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, open_ones: bool = False) -> np.ndarray:
@@ -49,10 +48,13 @@ def compound_states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, o
 
     open_ones : tell them from hits among convex parts, too, which takes longer.
     """
-    return _states(compound_parts(A), compound_parts(B), X_WA, X_WB, open_ones)
+    return _states(compound_parts(A), compound_parts(B), X_WA, X_WB, open_ones, settle=True)
 
 
-def _states(A: CompoundParts, B: CompoundParts, X_WA, X_WB, open_ones: bool = False) -> np.ndarray:
+def _states(
+    A: CompoundParts, B: CompoundParts, X_WA, X_WB, open_ones: bool = False, *, settle: bool = False
+) -> np.ndarray:
+    """`compound_states`; settle : decide meshes touching within rounding, hits to searches for translations."""
     states = np.full(len(X_WA), APART)
     if A.convex is not None and B.convex is not None:
         met = np.flatnonzero(convex_hits(A.convex, B.convex, X_WA, X_WB))
@@ -74,7 +76,7 @@ def _states(A: CompoundParts, B: CompoundParts, X_WA, X_WB, open_ones: bool = Fa
             if len(some) and len(poses):
                 gaps_ij = _box_gaps(A, B, X_WA[poses], X_WB[poses], i, j)[:, range(len(some)), range(len(some))]
                 at, pose = np.nonzero(gaps_ij.T <= 0.0)
-                _take_states(A, B, i[at], j[at], poses[pose], X_WA, X_WB, states)
+                _take_states(A, B, i[at], j[at], poses[pose], X_WA, X_WB, states, settle)
             meshed[i, j] = False
     poses = np.flatnonzero(states != HIT)
     if len(poses):
@@ -86,14 +88,14 @@ def _states(A: CompoundParts, B: CompoundParts, X_WA, X_WB, open_ones: bool = Fa
         if len(X_WA) == 1 and near.sum() > _ASKED_FIRST:
             deepest = np.where(near[0], gaps[0], math.inf).argmin().reshape(1)
             first_a, first_b = np.unravel_index(deepest, meshed.shape)
-            _take_states(A, B, first_a, first_b, poses, X_WA, X_WB, states)
+            _take_states(A, B, first_a, first_b, poses, X_WA, X_WB, states, settle)
         pairs = np.argwhere(np.any(near, axis=0))
         begin, size = 0, _ASKED_FIRST
         while begin < len(pairs):  # in blocks, each larger, since poses with a hit are done with
             i, j = pairs[begin : begin + size].T
             begin, size = begin + size, 4 * size
             at, pose = np.nonzero(near[:, i, j].T & (states[poses] != HIT))
-            _take_states(A, B, i[at], j[at], poses[pose], X_WA, X_WB, states)
+            _take_states(A, B, i[at], j[at], poses[pose], X_WA, X_WB, states, settle)
     return states
 
 
@@ -147,7 +149,9 @@ def _leave_out_groups(M: CompoundParts, N: CompoundParts, X_WM, X_WN, near: np.n
     return within
 
 
-def _take_states(A: CompoundParts, B: CompoundParts, i, j, poses, X_WA, X_WB, states: np.ndarray) -> None:
+def _take_states(
+    A: CompoundParts, B: CompoundParts, i, j, poses, X_WA, X_WB, states: np.ndarray, settle: bool
+) -> None:
     """Ask about pairs of parts i, j (k,) at poses by number (k,), those of a pair together, and put what is told of the
     unions into ``states`` (n,)."""
     status = np.full(len(poses), OPEN)
@@ -169,8 +173,16 @@ def _take_states(A: CompoundParts, B: CompoundParts, i, j, poses, X_WA, X_WB, st
         rows = rows[states[poses[some[rows]]] != HIT]
         if len(rows):
             at, first = poses[some[rows]], some[rows[0]]
-            state = part_states(A.parts[i[first]].shape, B.parts[j[first]].shape, PA.of(rows), PB.of(rows))
+            part_a, part_b = A.parts[i[first]], B.parts[j[first]]
+            state = part_states(part_a.shape, part_b.shape, PA.of(rows), PB.of(rows))
+            if settle and part_a.exact and part_b.exact:
+                settle_states(state, _parts_of_pair(part_a, part_b, X_WA[at], X_WB[at]))
             states[at] = np.where(state == APART, states[at], state)
+
+
+def _parts_of_pair(A: Part, B: Part, X_WA, X_WB) -> Callable[[int], tuple[PosedPart, PosedPart]]:
+    """Both parts of pair k, of unions at poses (n, 4, 4)."""
+    return lambda k: (PosedPart(A.shape, X_WA[k], A.X), PosedPart(B.shape, X_WB[k], B.X))
 
 
 def _states_by_balls(
@@ -207,7 +219,7 @@ def _ball_gaps(
     if len(some):
         X = poses_at(centres[some])
         limit = float((within + reach)[some].max()) * (1.0 + 2.0**-40)
-        lower = surface_distances(body.tree, _point().tree, placed.X[some], X, limit).lower
+        lower = surface_distances(body.tree, origin_body().tree, placed.X[some], X, limit).lower
         gap = (lower - reach[some]) * (1.0 - 2.0**-40)
         apart = gap > 0.0
         some, X = some[apart], X[apart]
@@ -215,12 +227,6 @@ def _ball_gaps(
     if len(some) and body.solid:
         sides[some] = points_in_solid(body.tree, placed.X[some], np.zeros(3), X)
     return gaps, sides
-
-
-@cache
-def _point() -> Body:
-    """The origin as a body: one facet without area."""
-    return body_of(_POINT)
 
 
 def _mesh_pairs(A: CompoundParts, B: CompoundParts, wanted: np.ndarray) -> list[list[int]]:
@@ -354,6 +360,8 @@ def _part_rows(
         else:
             part_a, part_b, PA, PB = A.parts[i], B.parts[j], placed[0][i].of(poses), placed[1][j].of(poses)
         rows = part_rows(part_a.shape, part_b.shape, PA, PB, limit)
+        if part_a.exact and part_b.exact:
+            settle_rows(rows, _parts_of_pair(part_a, part_b, X_WA[poses], X_WB[poses]), limit)
         for name, side, number in (("part_a", A, i), ("part_b", B, j)):
             if side.is_union:
                 rows[name] = number

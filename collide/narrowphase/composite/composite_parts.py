@@ -56,6 +56,11 @@ class Part(NamedTuple):
         return _placed(X_WB, self.X, _reach_of(self.bound, about), self.rotation, self.shift)
 
     @property
+    def exact(self) -> bool:
+        """Whether rounding moved no point of the part in the union."""
+        return self.rotation == self.shift == 0.0
+
+    @property
     def bound(self) -> PackedConvex:
         """A convex set that holds the part, in the part's own frame."""
         return bounding_parts_of(self.shape)[0][0]

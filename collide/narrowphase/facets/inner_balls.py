@@ -16,11 +16,10 @@ import numpy as np
 
 from collide.base.poses_at import poses_at
 from collide.kernels import address_of
-from collide.lowering.facet_bodies import Body, body_of
+from collide.lowering.facet_bodies import Body, body_of, origin_body
 from collide.narrowphase.facets.balls_within_balls import within_balls
 from collide.narrowphase.facets.facet_queries import points_in_solid, surface_distances
 from collide.narrowphase.facets.winding_numbers import INSIDE, ON_SURFACE
-from collide.shapes.primitives import Sphere
 from collide.shapes.shape import Shape, kept_with_shape
 
 #: Points of a grid along each axis, facets with points beneath, how deep beneath as parts of the size; balls kept, and
@@ -71,15 +70,9 @@ def distances_within(body: Body, X: np.ndarray, points: np.ndarray) -> np.ndarra
     sides = points_in_solid(body.tree, X, np.zeros(3), poses)
     some = np.flatnonzero((sides == INSIDE) | (sides == ON_SURFACE))
     if len(some):
-        origin = body_of(_sphere()).tree
+        origin = origin_body().tree
         distances[some] = surface_distances(body.tree, origin, X, np.ascontiguousarray(poses[some])).lower
     return distances
-
-
-@cache
-def _sphere() -> Sphere:
-    """A body whose facet is the origin."""
-    return Sphere(1.0)
 
 
 @cache

@@ -8,6 +8,7 @@ rounding them.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -17,7 +18,6 @@ from collide.lowering.enclosures import enclosure_of
 from collide.lowering.facet_bodies import body_of
 from collide.lowering.kind_of_shape import kind_of
 from collide.lowering.kinds import Kind
-from collide.narrowphase.bounds import PROMISE_STORED
 from collide.narrowphase.composite.composite_meshes import compound_rows, compound_states
 from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_batches import convex_hits, convex_rows
@@ -31,13 +31,12 @@ from collide.narrowphase.facets.facet_kernel_calls import (
     serves_single_calls,
     write_rows,
 )
-from collide.narrowphase.facets.mesh_collide_kernel import APART, HIT, OPEN
+from collide.narrowphase.facets.mesh_collide_kernel import APART, OPEN
 from collide.narrowphase.facets.mesh_pairs import checked_poses, hull_shape, mesh_rows, mesh_states
 from collide.narrowphase.facets.nearest_item_calls import facets_of, prepared_items, serves
-from collide.narrowphase.facets.touching_radii import Touching, settle_touching
-from collide.narrowphase.fallback_searches import lay_points_apart
+from collide.narrowphase.facets.touching_facets import PosedPart, make_gaps, settle_rows, settle_states
 from collide.narrowphase.prepared_pairs import Prepared
-from collide.results import EXACT, PAIR_DTYPE, UNDECIDED
+from collide.results import PAIR_DTYPE, UNDECIDED
 from collide.shapes.shape import Shape
 
 
@@ -73,17 +72,13 @@ def _settle_states(states: np.ndarray, A: Shape, B: Shape, X_WA: np.ndarray, X_W
     if covers is not None:
         hulls_meet = convex_hits(*covers, _poses_of(X_WA, undecided), _poses_of(X_WB, undecided))
         states[undecided[~hulls_meet]] = APART
-    for k in np.flatnonzero(states == OPEN).tolist():
-        touching = _touching(A, B, X_WA, X_WB, k)
-        if touching is not None and touching.is_hit is not None:
-            states[k] = HIT if touching.is_hit else APART
+    if method_of(kind_of(A), kind_of(B)) is Method.FACETS:  # unions are settled part by part
+        settle_states(states, _parts_at(A, B, X_WA, X_WB))
 
 
-def _touching(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, k: int) -> Touching | None:
-    """What facets prove of pair k; ``None`` of unions, which are left to their parts."""
-    if method_of(kind_of(A), kind_of(B)) is not Method.FACETS:
-        return None
-    return settle_touching(A, B, _poses_of(X_WA, [k])[0], _poses_of(X_WB, [k])[0])
+def _parts_at(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> Callable[[int], tuple[PosedPart, PosedPart]]:
+    """Both bodies of pair k."""
+    return lambda k: (PosedPart(A, X_WA[k if len(X_WA) > 1 else 0]), PosedPart(B, X_WB[k if len(X_WB) > 1 else 0]))
 
 
 def _compound_states(A: Shape, B: Shape, X_WA, X_WB, check: bool, parts_open: bool) -> np.ndarray:
@@ -127,17 +122,9 @@ def _settle_rows(rows: np.ndarray, A: Shape, B: Shape, X_WA: np.ndarray, X_WB: n
         poses = _poses_of(X_WA, undecided), _poses_of(X_WB, undecided)
         hulls = convex_rows(*covers, *poses, depths=False)
         apart = hulls["lower"] > 0.0
-        _make_gaps(rows, undecided[apart], hulls[apart], limit)
-    for k in np.flatnonzero(rows["how"] == UNDECIDED).tolist():
-        touching = _touching(A, B, X_WA, X_WB, k)
-        if touching is not None and touching.is_hit:
-            row = rows[k : k + 1]
-            row["hit"], row["how"], row["upper"] = True, EXACT, np.minimum(row["upper"], 0.0)
-            row["distance"] = np.minimum(row["distance"], row["upper"])
-            size = np.abs(row["point_a"]).max() + np.abs(row["point_b"]).max()
-            row["certified"] = row["upper"] - row["lower"] <= PROMISE_STORED * size
-        elif touching is not None and touching.is_hit is False:
-            _make_gaps(rows, np.array([k]), touching.row, limit)
+        make_gaps(rows, undecided[apart], hulls[apart], limit)
+    if method_of(kind_of(A), kind_of(B)) is Method.FACETS:
+        settle_rows(rows, _parts_at(A, B, X_WA, X_WB), limit)
 
 
 def rows_within(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, limit: float) -> np.ndarray:
@@ -238,17 +225,3 @@ def _convex_cover(shape: Shape) -> Shape | None:
 
 def _poses_of(X: np.ndarray, some: np.ndarray | list[int]) -> np.ndarray:
     return X if len(X) == 1 else X[some]
-
-
-def _make_gaps(rows: np.ndarray, which: np.ndarray, hulls: np.ndarray, limit: float) -> None:
-    """Make undecided rows gaps, in place, where their hulls are proven to be apart."""
-    row = rows[which]
-    row["hit"], row["how"], row["normal"] = False, hulls["how"], hulls["normal"]
-    row["lower"] = hulls["lower"]
-    row["beyond"] = row["lower"] > limit
-    row["certified"] = row["beyond"]
-    upper = np.maximum(row["upper"], row["lower"])
-    row["distance"] = np.where(row["beyond"], row["lower"], np.clip(hulls["distance"], row["lower"], upper))
-    row["upper"] = np.where(row["beyond"], math.inf, upper)
-    lay_points_apart(row, np.arange(len(row)))
-    rows[which] = row

@@ -26,6 +26,7 @@ from collide.narrowphase.facets.facet_kernel_calls import body_rows, states
 from collide.narrowphase.facets.mesh_collide_kernel import HIT
 from collide.narrowphase.facets.mesh_collide_kernel import OPEN as UNTOLD
 from collide.narrowphase.facets.nearest_item_calls import gap_rows, prepared_items, surface_states
+from collide.narrowphase.facets.touching_facets import PosedPart, settle_rows, settle_states
 from collide.narrowphase.fields import clouds_and_meshes
 from collide.narrowphase.fields.ball_walk_kernel import MEETS, OPEN, WORK, clouds_meet_balls
 from collide.narrowphase.fields.field_items import BoxAround, FieldItems, box_in_frame, lowest_items
@@ -91,11 +92,17 @@ def _facets_answer(
     out: np.ndarray, A: SweptMesh, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, question: Question
 ) -> np.ndarray:
     """(n,) bool: which poses of a swept mesh and a body of facets are left open; all others are answered."""
+
+    def parts_at(k: int) -> tuple[PosedPart, PosedPart]:
+        return PosedPart(A, X_WA[k]), PosedPart(B, X_WB[k])
+
     if question.boolean:
         answers = states(body_of(A), body_of(B), X_WA, X_WB)
+        settle_states(answers, parts_at)
         out[answers == HIT] = True
         return answers == UNTOLD
     rows = body_rows(body_of(A), body_of(B), X_WA, X_WB, limit=question.limit, depths=question.depths)
+    settle_rows(rows, parts_at, question.limit)
     out[:] = rows
     return rows["how"] == UNDECIDED
 
