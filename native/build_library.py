@@ -44,7 +44,7 @@ C_SOURCES = [
     "capi_robot_motions.c",
     "capi_field.c", "capi_field_cells.c", "capi_field_items.c", "capi_field_pairs.c",
     "capi_world.c", "capi_world_shapes.c", "capi_world_tree.c", "capi_world_pairs.c", "capi_world_outside.c",
-    "capi_world_wholes.c", "capi_world_margins.c",
+    "capi_world_wholes.c", "capi_world_margins.c", "capi_world_casts.c",
     "host_mujoco.c", "host_slots.c", "host_terrain.c",
     "host_terrain_bodies.c", "host_terrain_deep.c", "host_terrain_facets.c", "host_terrain_near.c",
     "host_terrain_prisms.c", "host_terrain_rows.c",

@@ -26,11 +26,11 @@ struct cast_space *cast_space_of(collide_workspace *space)
     return space->cast = made;
 }
 
-int take_direction(collide_workspace *space, const double direction[3], double vector[3])
+int take_direction(const collide_workspace *space, const double direction[3], double vector[3], int64_t *exponent)
 {
     int k;
     for (k = 0; k < 3; k++) if (!(fabs(direction[k]) < INFINITE)) return 0;
-    return space->kernels->scale_directions(address_of(direction), 1, address_of(vector), address_of(&space->cast->exponent)) == 1;
+    return space->kernels->scale_directions(address_of(direction), 1, address_of(vector), address_of(exponent)) == 1;
 }
 
 int put_pose(collide_workspace *space, const double *X, unsigned flags, int row)
@@ -123,7 +123,7 @@ static collide_status cast_once(const struct cast_question *asked, collide_first
     collide_workspace *space = asked->space;
     collide_status status;
     begin_contact(first);
-    if (!take_direction(space, asked->direction, space->cast->question)) return COLLIDE_INVALID_ARGUMENT;
+    if (!take_direction(space, asked->direction, space->cast->question, &space->cast->exponent)) return COLLIDE_INVALID_ARGUMENT;
     if (!put_pose(space, asked->X_WA, asked->flags, 0) || !put_pose(space, asked->X_WB, asked->flags, BLOCK))
         return COLLIDE_INVALID_POSE;
     space->cast->question[CAST_LIMIT] = ldexp(asked->limit, (int)space->cast->exponent);

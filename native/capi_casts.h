@@ -45,8 +45,8 @@ struct cast_space *cast_space_of(collide_workspace *space);
 /* What meets nothing, proven. */
 void begin_contact(collide_first_contact *first);
 
-/* A direction scaled by a power of two, into `vector` and the room's `exponent`; 0 where it is none. */
-int take_direction(collide_workspace *space, const double direction[3], double vector[3]);
+/* A direction scaled by a power of two into `vector`, 2^-*exponent; 0 where it is none. */
+int take_direction(const collide_workspace *space, const double direction[3], double vector[3], int64_t *exponent);
 
 /* Whether a matrix is a pose, which then stands in row `row` of the workspace's poses. */
 int put_pose(collide_workspace *space, const double *X, unsigned flags, int row);

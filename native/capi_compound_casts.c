@@ -61,7 +61,7 @@ collide_status collide_compound_cast(collide_workspace *workspace, const collide
     if ((cast = cast_space_of(workspace)) == NULL) return COLLIDE_NO_MEMORY;
     fill_header(workspace, A, B);
     given = round_as_kernels_do();
-    if (!take_direction(workspace, direction, vector)) status = COLLIDE_INVALID_ARGUMENT;
+    if (!take_direction(workspace, direction, vector, &cast->exponent)) status = COLLIDE_INVALID_ARGUMENT;
     else if (!put_pose(workspace, X_WA, flags, 0) || !put_pose(workspace, X_WB, flags, BLOCK)) status = COLLIDE_INVALID_POSE;
     else {
         int64_t met = workspace->kernels->cast_single_union(address_of(cast->union_header), address_of(X_WA), address_of(X_WB),

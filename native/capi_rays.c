@@ -179,7 +179,7 @@ static collide_status cast_ray(struct ray *ray, double max_distance, collide_ray
     int k;
     begin_hit(hit);
     for (k = 0; k < 3; k++) if (!(fabs(ray->origin[k]) <= LARGEST)) return COLLIDE_INVALID_ARGUMENT;
-    if (!take_direction(ray->space, ray->direction, cast->ray + RAY_VECTOR)) return COLLIDE_INVALID_ARGUMENT;
+    if (!take_direction(ray->space, ray->direction, cast->ray + RAY_VECTOR, &cast->exponent)) return COLLIDE_INVALID_ARGUMENT;
     if (!put_pose(ray->space, ray->X, ray->flags, 0)) return COLLIDE_INVALID_POSE;
     pose = ray->chords->poses + (ray->compound != NULL ? POSE * ray->chords->n : 0);
     memcpy(pose, ray->space->poses, POSE * sizeof *pose);

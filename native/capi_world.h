@@ -161,6 +161,24 @@ void sort_keys(struct world_space *own, size_t n_keys, size_t n);
 collide_status answer_keys(const collide_world *world, collide_workspace *space, const int64_t *keys, size_t n, const double *X_WP,
                            int boolean, double limit);
 
+/* capi_world_pairs.c: what may come first, a pair or a body, and no sooner than a bound by boxes; in the order of bounds, then keys. */
+struct candidate {
+    double bound;
+    int64_t key;
+};
+int compare_candidates(const void *one, const void *other);
+
+/* capi_world_outside.c: the box around a shape at a pose; into own->skipped 1 for each body that a question leaves out, and whether
+   there is any; the row of question k while nothing is met, and where it is left open; a direction that is none. */
+void box_around(const collide_world *world, const collide_shape *shape, const double *X_WS, double box[6]);
+int skip_bodies(const collide_world *world, struct world_space *own, const uint32_t *group, const uint32_t *mask);
+collide_world_hit nothing_met(size_t k);
+void leave_open(collide_world_hit *hit);
+collide_status refuse_direction(collide_workspace *space, const char *caller, size_t k);
+/* How many bodies, of those not skipped, are in the way of a moved box, or may be nearest to a point: into own->keys, and own->bounds, of
+   t or distance from below.   n_leaves : of leaves side by side, or -1 for the tree. */
+size_t bodies_ahead(const collide_world *world, struct world_space *own, const double question[SWEEP], int of_points, int64_t n_leaves);
+
 /* capi_world_wholes.c: whether a body's shape, mesh or field, the others of which are NULL, was not freed. */
 int is_alive(const collide_shape *shape, const collide_mesh *mesh, const collide_field *field);
 

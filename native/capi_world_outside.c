@@ -1,5 +1,6 @@
 /* Shapes, rays, points and boxes from outside a world against its bodies, as collide/worlds/outside.py and casts.py answer
    them. */
+#include "capi_casts.h"
 #include "capi_contacts.h"
 #include "capi_world.h"
 
@@ -58,8 +59,7 @@ collide_status collide_world_boxes_near(const collide_world *world, collide_work
     return too_many(workspace, n, capacity);
 }
 
-/* The box around a shape at a pose. */
-static void box_around(const collide_world *world, const collide_shape *shape, const double *X_WS, double box[6])
+void box_around(const collide_world *world, const collide_shape *shape, const double *X_WS, double box[6])
 {
     int64_t parts[SINGLE_PARTS], row = 0, body;
     double pose[POSE];
@@ -133,8 +133,7 @@ collide_status collide_world_query(const collide_world *world, collide_workspace
 
 /* --- rays and points ------------------------------------------------------------------------------------------------ */
 
-/* Into own->skipped 1 for each body that a question leaves out; whether there is any. */
-static int skip_bodies(const collide_world *world, struct world_space *own, const uint32_t *group, const uint32_t *mask)
+int skip_bodies(const collide_world *world, struct world_space *own, const uint32_t *group, const uint32_t *mask)
 {
     int64_t any = 0;
     size_t k;
@@ -146,8 +145,7 @@ static int skip_bodies(const collide_world *world, struct world_space *own, cons
     return (int)any;
 }
 
-/* A row of what meets nothing. */
-static collide_world_hit nothing_met(size_t k)
+collide_world_hit nothing_met(size_t k)
 {
     collide_world_hit hit;
     memset(&hit, 0, sizeof hit);
@@ -156,6 +154,19 @@ static collide_world_hit nothing_met(size_t k)
     hit.distance = hit.lower = hit.upper = INFINITE;
     hit.certified = 1;
     return hit;
+}
+
+void leave_open(collide_world_hit *hit)
+{
+    int32_t ray = hit->ray;
+    memset(hit, 0, sizeof *hit);
+    hit->ray = ray;
+}
+
+collide_status refuse_direction(collide_workspace *space, const char *caller, size_t k)
+{
+    return refuse(space->message, COLLIDE_INVALID_ARGUMENT,
+                  "%s: directions_W[%zu] is 0, not finite, outside 1e-100 ... 1e100, or has components of ratio 2^500", caller, k);
 }
 
 /* Whether n points, x y z of each, are finite and not too large; *k : which is not. */
@@ -213,21 +224,16 @@ collide_status collide_world_raycast(const collide_world *world, collide_workspa
     for (k = 0; k < n && status == COLLIDE_OK; k++) {
         collide_status one;
         memcpy(ray, origins_W + 3 * k, 3 * sizeof *ray);
-        const double *direction = directions_W + 3 * k;
-        if (world->kernels->scale_directions(address_of(direction), 1, address_of(ray + 3), address_of(&exponent)) < 1) {
-            status = refuse(workspace->message, COLLIDE_INVALID_ARGUMENT,
-                            "%s: directions_W[%zu] is 0, not finite, outside 1e-100 ... 1e100, or has components of ratio 2^500",
-                            caller, k);
+        if (!take_direction(workspace, directions_W + 3 * k, ray + 3, &exponent)) {
+            status = refuse_direction(workspace, caller, k);
             break;
         }
         hits[k] = nothing_met(k);
         one = cast_ray(world, workspace->world, ray, exponent, max_distance, &hits[k]);
-        if (one != COLLIDE_OK) {
-            memset(&hits[k], 0, sizeof hits[k]);
-            if (first == COLLIDE_OK)
-                first = refuse(workspace->message, one, "%s: ray %zu touches, or begins on, a surface within rounding", caller, k);
-        }
         hits[k].ray = (int32_t)k;
+        if (one != COLLIDE_OK) leave_open(&hits[k]);
+        if (one != COLLIDE_OK && first == COLLIDE_OK)
+            first = refuse(workspace->message, one, "%s: ray %zu touches, or begins on, a surface within rounding", caller, k);
         if (statuses != NULL) statuses[k] = one;
     }
     round_as_before(given);
@@ -258,27 +264,38 @@ static int lay_out_leaves(const collide_world *world, struct world_space *own, i
     return 1;
 }
 
-/* Bodies that may be nearest to a point, as keys, ascending; *n : how many. n_leaves : of leaves side by side, or -1 for the
-   tree. */
-static int bodies_around(const collide_world *world, struct world_space *own, const double *point, double limit, int64_t n_leaves,
-                         size_t *n)
+size_t bodies_ahead(const collide_world *world, struct world_space *own, const double question[SWEEP], int of_points, int64_t n_leaves)
 {
-    double question[SWEEP] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
     const double *nodes = n_leaves < 0 ? world->tree.nodes : own->flat_nodes;
     const int64_t *links = n_leaves < 0 ? world->tree.links : own->flat_links;
-    int64_t count, n_nodes = n_leaves < 0 ? world->tree.sections[world->tree.n_sections] : n_leaves;
-    size_t k;
+    int64_t n_nodes = n_leaves < 0 ? world->tree.sections[world->tree.n_sections] : n_leaves, count, k;
+    size_t n = 0, j;
+    count = world->kernels->boxes_ahead(address_of(question), 1, (uint8_t)of_points, address_of(nodes), address_of(links), n_nodes,
+                                        address_of(own->pairs), address_of(own->bounds), (int64_t)own->n_keys);
+    for (k = 0; k < count; k++) {
+        int64_t body = own->pairs[2 * k + 1];
+        if (own->skipped[body]) continue;
+        own->bounds[n] = own->bounds[k];
+        own->keys[n++] = body;
+    }
+    for (j = 0; j < world->n_unbounded; j++) {
+        if (own->skipped[world->unbounded[j]]) continue;
+        own->bounds[n] = 0.0;
+        own->keys[n++] = world->unbounded[j];
+    }
+    return n;
+}
+
+/* Bodies that may be nearest to a point, as keys, ascending; how many.   n_leaves : as of `bodies_ahead`. */
+static size_t bodies_around(const collide_world *world, struct world_space *own, const double *point, double limit, int64_t n_leaves)
+{
+    double question[SWEEP] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+    size_t n;
     memcpy(question, point, 3 * sizeof *question);
     question[SWEEP - 1] = limit;
-    if (!fit_keys(own, world->n)) return 0; /* no body is named twice */
-    count = world->kernels->boxes_ahead(address_of(question), 1, 1, address_of(nodes), address_of(links), n_nodes,
-                                        address_of(own->pairs), address_of(own->bounds), (int64_t)own->n_keys);
-    for (k = 0; k < (size_t)count; k++) own->keys[k] = own->pairs[2 * k + 1];
-    *n = (size_t)count;
-    for (k = 0; k < world->n_unbounded; k++)
-        if (!own->skipped[world->unbounded[k]]) own->keys[(*n)++] = world->unbounded[k];
-    sort_keys(own, *n, world->n);
-    return 1;
+    n = bodies_ahead(world, own, question, 1, n_leaves);
+    sort_keys(own, n, world->n);
+    return n;
 }
 
 /* The least signed distance of a point and the bodies of n keys, ascending: of several the first. Another body may be nearer
@@ -341,8 +358,8 @@ collide_status collide_world_nearest(const collide_world *world, collide_workspa
         status = no_memory(workspace);
     for (k = 0; k < n && status == COLLIDE_OK; k++) {
         hits[k] = nothing_met(k);
-        if (!bodies_around(world, workspace->world, points_W + 3 * k, max_distance, n_leaves, &near)) status = no_memory(workspace);
-        else status = nearest_of_keys(world, workspace, near, points_W + 3 * k, max_distance, &hits[k]);
+        near = bodies_around(world, workspace->world, points_W + 3 * k, max_distance, n_leaves);
+        status = nearest_of_keys(world, workspace, near, points_W + 3 * k, max_distance, &hits[k]);
     }
     round_as_before(given);
     return status;

@@ -413,19 +413,13 @@ collide_status collide_world_distances(const collide_world *world, collide_works
 
 /* --- the nearest pair ----------------------------------------------------------------------------------------------- */
 
-/* A pair that may be the nearest: no nearer than a bound, by its boxes. */
-struct candidate {
-    double bound;
-    int64_t key;
-};
-
 /* The nearest pair so far. */
 struct nearest {
     double distance;
     int64_t key; /* -1: none */
 };
 
-static int compare_candidates(const void *one, const void *other)
+int compare_candidates(const void *one, const void *other)
 {
     const struct candidate *a = one, *b = other;
     if (a->bound != b->bound) return a->bound < b->bound ? -1 : 1;

@@ -674,19 +674,19 @@ COLLIDE_API collide_status collide_world_boxes_near(const collide_world *world, 
                                                     const double high_W[3], double margin, int32_t *ids, size_t capacity,
                                                     size_t *count);
 
-/* What a ray meets first, or which body is nearest to a point: a row of Python's WorldHits, byte by byte. */
+/* What a ray or a moved shape meets first, or which body is nearest to a point: a row of Python's WorldHits, byte by byte. */
 typedef struct collide_world_hit {
     double distance;     /* t on a ray, in lengths of its direction; of points the signed distance [m]; infinite of nothing */
     double lower, upper; /* lower <= truth <= upper, proven where certified */
-    double normal[3];    /* unit vector in W: outward from the body for rays, from the point to the body; or zeros */
+    double normal[3];    /* unit vector in W: outward from the body for rays, from the cast shape or the point to the body; or zeros */
     double point[3];     /* in W [m], of the body; zeros where nothing is met */
-    int32_t ray;         /* number of the ray or point */
+    int32_t ray;         /* number of the ray, cast or point */
     int32_t body;        /* id of the body, -1 where nothing is met */
     int32_t item;        /* 0; -1 where nothing is met */
-    int32_t facet;       /* of a ray on a cylinder or cone: 0 round about, 1 below, 2 above; as of Python's raycast */
+    int32_t facet;       /* of a ray on a cylinder or cone: 0 round about, 1 below, 2 above; as of Python's raycast; -1 of casts */
     uint8_t hit;         /* 1 where anything is met */
     uint8_t certified;   /* 1 where hit or miss is proven, and the bracket narrow */
-    uint8_t at_start;    /* 0 */
+    uint8_t at_start;    /* of casts 1 where they touch before they move */
 } collide_world_hit;
 
 /* The first body on each of n rays, x y z of origins and directions, which need be no unit vectors. max_distance : in lengths
@@ -696,6 +696,17 @@ typedef struct collide_world_hit {
 COLLIDE_API collide_status collide_world_raycast(const collide_world *world, collide_workspace *workspace, const double *origins_W,
                                                  const double *directions_W, size_t n, double max_distance, const uint32_t *group,
                                                  const uint32_t *mask, collide_world_hit *hits, collide_status *statuses);
+
+/* The first body touched by a shape from outside that moves along a direction, without turning: n casts, poses and directions n of each,
+   or 1 that goes with all. Of several touched at the same place the one with the least id. max_distance, flags : as of `collide_cast`;
+   group, mask, statuses : as of `collide_world_raycast`. In a row `normal` goes from the shape to the body, and `point` is the body's.
+   COLLIDE_UNSUPPORTED, never a guess, of a cast, whose row is zeros: where `collide_cast` leaves a body to Python that comes before what is
+   proven to be met, and where a mesh or a field does, which the message names; and where the shape is a half-space, which Python refuses
+   as well. O(log n) boxes, and a `collide_cast` for each body in the way, the nearest first. */
+COLLIDE_API collide_status collide_world_cast(const collide_world *world, collide_workspace *workspace, const collide_shape *shape,
+                                              collide_poses X_WS, collide_vectors directions_W, double max_distance, unsigned flags,
+                                              const uint32_t *group, const uint32_t *mask, collide_world_hit *hits,
+                                              collide_status *statuses);
 
 /* The body of least signed distance to each of n points, x y z of each, no farther than max_distance; of several the one with
    the least id. group, mask : as of `collide_world_raycast`; with them every body's box is looked at. */

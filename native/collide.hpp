@@ -663,6 +663,16 @@ public:
         if (status != COLLIDE_UNSUPPORTED) told(space, status);
         return found;
     }
+    // The first body touched by a shape from outside that moves along a direction.
+    Answered<collide_world_hit> cast(Workspace &space, const Shape &shape, Poses X_WS, Vectors directions_W,
+                                     double max_distance = infinity, unsigned flags = 0) const {
+        std::size_t n = longest({X_WS.size(), directions_W.count()});
+        Answered<collide_world_hit> found{std::vector<collide_world_hit>(n), std::vector<collide_status>(n)};
+        collide_status status = collide_world_cast(get(), space.get(), shape.get(), X_WS, directions_W, max_distance, flags, nullptr,
+                                                   nullptr, found.rows.data(), found.statuses.data());
+        if (status != COLLIDE_UNSUPPORTED) told(space, status);
+        return found;
+    }
     // The body nearest to each point, x y z of each.
     std::vector<collide_world_hit> nearest(Workspace &space, Span<const double> points_W, double max_distance = infinity) const {
         std::vector<collide_world_hit> found(rows(points_W, 3));

@@ -195,6 +195,9 @@ _TYPES = {
     "collide_world_raycast": [
         c_void_p, c_void_p, c_void_p, c_void_p, c_size_t, c_double, c_void_p, c_void_p, c_void_p, c_void_p,
     ],
+    "collide_world_cast": [
+        c_void_p, c_void_p, c_void_p, Poses, Vectors, c_double, c_uint, c_void_p, c_void_p, c_void_p, c_void_p,
+    ],
     "collide_world_nearest": [
         c_void_p, c_void_p, c_void_p, c_size_t, c_double, c_void_p, c_void_p, c_void_p,
     ],

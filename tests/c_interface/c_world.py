@@ -158,6 +158,22 @@ class CWorld:
         )
         return status, rows, statuses
 
+    def cast(
+        self, shape: c.CShape, X_WS, directions, limit: float = math.inf, flags: int = 0, group=None, mask=None,
+        asker=None,
+    ):
+        """(status, rows, status of each)."""
+        X_WS = np.ascontiguousarray(X_WS, dtype=np.float64).reshape(-1, 4, 4)
+        directions = np.ascontiguousarray(directions, dtype=np.float64).reshape(-1, 3)
+        n = max(len(X_WS), len(directions))
+        rows, statuses = np.zeros(n, dtype=WORLD_HIT_DTYPE), np.full(n, -1, dtype=np.int32)
+        status = self._library.collide_world_cast(
+            self.handle, self._of(asker), shape.handle, c.Poses(X_WS.ctypes.data, len(X_WS)),
+            c.Vectors(directions.ctypes.data, len(directions)), limit, flags, _bits(group), _bits(mask),
+            rows.ctypes.data, statuses.ctypes.data,
+        )
+        return status, rows, statuses
+
     def nearest(self, points, limit: float = math.inf, group=None, mask=None, asker=None):
         points = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
         rows = np.zeros(len(points), dtype=WORLD_HIT_DTYPE)

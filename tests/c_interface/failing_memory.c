@@ -65,6 +65,7 @@ static unsigned long scene(collide_shape *const *shapes, const collide_mesh *mes
     static collide_contact contacts[2000];
     static collide_world_hit hits[2];
     const double origins[6] = {-3, 0.1, 0.2, 0.3, 0.1, 9}, directions[6] = {1, 0, 0, 0.01, 0.02, -1};
+    const collide_vectors along = {directions, 2};
     const uint32_t group = 1;
     collide_world *world = NULL;
     collide_workspace *workspace = NULL;
@@ -109,6 +110,8 @@ static unsigned long scene(collide_shape *const *shapes, const collide_mesh *mes
     TRY(collide_world_nearest(world, workspace, origins, 2, INFINITY, &group, &group, hits));
     sum = add_up(sum, &hits[0].distance, sizeof hits[0].distance);
     TRY(collide_world_raycast(world, workspace, origins, directions, 2, INFINITY, NULL, NULL, hits, NULL));
+    sum = add_up(sum, &hits[1].distance, sizeof hits[1].distance);
+    TRY(collide_world_cast(world, workspace, shapes[1], (collide_poses){X, 1}, along, INFINITY, 0, &group, &group, hits, NULL));
     sum = add_up(sum, &hits[1].distance, sizeof hits[1].distance);
     sum = add_up(sum, &status, sizeof status);
     collide_workspace_free(workspace);

@@ -162,7 +162,10 @@ class Both:
         self.tally["exact"] += int((rows["exact"] > 0).sum())
         self.compare("distances", rows, *self.own.distances(limit))
         self.compare("collisions", self.python.collisions().rows, *self.own.collisions())
-        self.compare("minimum", self.python.minimum(limit).rows, *self.own.minimum(limit))
+        nearest = self.python.minimum(limit).rows
+        if len(nearest) and nearest["distance"][0] == -math.inf:  # half-spaces: of several pairs Python tells any
+            nearest = rows[np.argmin(rows["distance"])][None]
+        self.compare("minimum", nearest, *self.own.minimum(limit))
         hitting = self.python.collisions().rows
         self.compare("hits", np.stack([hitting["a"], hitting["b"]], axis=1), *self.own.hits())
         status, hit = self.own.collides()
@@ -211,9 +214,35 @@ class Both:
         self.tally["rays open"] += int((~answered).sum())
         self.tally["rays hit"] += int(rows["hit"].sum())
         self.compare("rays", wanted[answered], c.OK, rows[answered])
+        self.ask_casts(case.B, which)
         wanted = self.python.nearest(origins, max_distance=reach, **which).rows
         self.tally["points with a body"] += int(wanted["hit"].sum())
         self.compare("nearest", wanted, *self.own.nearest(origins, reach, **which))
+
+
+    def ask_casts(self, shape: collide.Shape, which: dict) -> None:
+        """A shape from afar towards bodies, or past them, and from a body's pose; directions are of any length."""
+        random = np.random.default_rng([63, self.seed, self.step])
+        X_WS = np.stack([self.python.body(k).X_WB for k in random.choice(self.ids, 8).tolist()])
+        away = random.normal(size=(8, 3)) * 10.0 ** random.uniform(-1.0, 2.5, (8, 1))
+        directions = (random.normal(size=(8, 3)) * 0.2 - 1.0) * away
+        X_WS[1:, :3, 3] += away[1:]
+        directions *= 10.0 ** random.integers(-3, 4, (8, 1))
+        reach, flags = float(random.choice([1.0, math.inf])), int(random.choice([0, c.START_NORMALS]))
+        status, rows, statuses = self.own.cast(c.CShape(shape), X_WS, directions, reach, flags, **which)
+        if isinstance(shape, collide.Halfspace):
+            assert status == c.UNSUPPORTED and "shape is a half-space" in self.own.question_message
+            return
+        wanted = self.python.shape_cast(
+            shape, X_WS, directions, max_distance=reach, start_normals=flags == c.START_NORMALS, **which
+        ).rows
+        answered = statuses == c.OK
+        assert (status == c.OK) == answered.all() and (statuses[~answered] == c.UNSUPPORTED).all()
+        self.tally["casts open"] += int((~answered).sum())
+        self.tally["casts in motion"] += int((rows["hit"] & ~rows["at_start"]).sum())
+        self.tally["casts from touching"] += int(rows["at_start"].sum())
+        self.tally["casts past bodies"] += int((rows["hit"] == 0).sum())
+        self.compare("casts", wanted[answered], c.OK, rows[answered])
 
 
 def are_equal(wanted: np.ndarray, rows: np.ndarray) -> bool:
@@ -258,11 +287,13 @@ def test_random_changes_have_pythons_bits(first):
     assert not wrong, f"{len(wrong)} differ, the first: {wrong[0]}"
     least = {
         "add": 4, "remove": 4, "far": 4, "near": 8, "replace": 4, "allow": 4, "sleep": 4, "near touching": 8,
-        "exact": 5, "contact rows": 400, "rays hit": 80, "points with a body": 200,
+        "exact": 5, "contact rows": 400, "rays hit": 80, "points with a body": 200, "casts in motion": 40,
+        "casts from touching": 40, "casts past bodies": 20,
     }
     few = {what: tally[what] for what, n in least.items() if tally[what] < n}
     assert not few and 0.2 < tally["hit rows"] / tally["rows"] < 0.9, (few, tally)
     assert tally["rays open"] < 0.05 * 12 * tally["rays"], tally
+    assert tally["casts open"] < 0.02 * 8 * tally["casts"], tally
 
 
 @pytest.mark.many(8)
@@ -353,6 +384,71 @@ def test_four_threads_at_once_have_pythons_bits():
     with ThreadPoolExecutor(4) as pool:
         assert all(all(equal) for equal in pool.map(answers, range(4)))
     assert len(wanted[0]) > 50
+
+
+# --- moved shapes -----------------------------------------------------------------------------------------------------
+
+
+def test_casts_through_many_bodies_have_pythons_bits():
+    """From anywhere in any direction among 400 bodies: rounds of candidates, limits that shrink, and ways out."""
+    python, own, _held = scattered(400, seed=2)
+    random, n_moved, n_open = np.random.default_rng(61), 0, 0
+    few = collide.Sphere(0.01), collide.Box(0.02, 0.03, 0.04), collide.ConvexHull(random.normal(size=(40, 3)) * 0.05)
+    for shape in (*few, collide.Cone(0.02, 0.05)):
+        at = random.uniform(-2.0, 17.0, (500, 3))
+        X_WS = np.stack([collide.pose(x, quat_wxyz=random.normal(size=4)) for x in at])
+        directions = random.normal(size=(500, 3))
+        wanted = python.shape_cast(shape, X_WS, directions).rows
+        status, rows, statuses = own.cast(c.CShape(shape), X_WS, directions)
+        answered = statuses == c.OK
+        assert are_equal(wanted[answered], rows[answered]) and (status == c.OK) == answered.all(), shape
+        n_moved += int((rows["hit"] & ~rows["at_start"]).sum())
+        n_open += int((~answered).sum())
+    assert n_moved > 500 and n_open < 40, (n_moved, n_open)
+
+
+def test_of_bodies_touched_at_the_same_place_the_least_id_is_told():
+    """Boxes and balls on a grid, cast along its lines: whatever is met at once, normal and point are the body's."""
+    python, own, random, n_ties, n_open = collide.World(), CWorld(), np.random.default_rng(62), 0, 0
+    shapes = [(shape, c.CShape(shape)) for shape in (collide.Box(1, 1, 1), collide.Sphere(0.5))]
+    for k in range(60):
+        X = c.identity_at(*random.integers(0, [6, 6, 2]).astype(float))
+        assert own.add(shapes[k % 2][1], X) == (c.OK, python.add(shapes[k % 2][0], X))
+    X_WS = np.stack([c.identity_at(*(random.integers(-2, 16, 3) * 0.5)) for _ in range(400)])
+    directions = random.integers(-1, 2, (400, 3)) * [1.0, 1.0, 2.0]
+    directions[(directions == 0.0).all(axis=1)] = 0.0, 1.0, 0.0
+    for shape in (collide.Box(1, 1, 1), collide.Sphere(0.5), collide.Box(2.5, 1.5, 0.5)):
+        wanted = python.shape_cast(shape, X_WS, directions).rows
+        _, rows, statuses = own.cast(c.CShape(shape), X_WS, directions)
+        for k in np.flatnonzero(statuses == c.OK):
+            others = [name for name in WORLD_HIT_DTYPE.names if name not in ("normal", "point")]
+            assert all(rows[k][name] == wanted[k][name] for name in others), (shape, k, rows[k], wanted[k])
+            if rows["hit"][k]:
+                met = python.body(int(rows["body"][k]))
+                alone = collide.shape_cast(shape, X_WS[k], directions[k], met.shape, met.X_WB)
+                same = (rows[k]["normal"] == alone.normal) & (rows[k]["point"] == alone.point)
+                assert same.all(), (shape, k, rows[k], alone)
+                n_ties += not rows["at_start"][k]
+        n_open += int((statuses != c.OK).sum())
+    assert n_ties > 80 and n_open < 120, (n_ties, n_open)
+
+
+def test_casts_leave_what_comes_before_a_mesh_answered():
+    """A ball before a mesh is met and told of; behind it, or with nothing but a cloud ahead, the cast is open."""
+    python, own, ball = collide.World(), CWorld(), collide.Sphere(0.5)
+    mesh = soak_pairs.shape("solid", 1.0, np.random.default_rng(98))
+    cloud = collide.PointCloud([[0.0, 0, 0]], 0.1)
+    held = [(mesh, c.CMesh(mesh), 0.0), (cloud, c.CField(cloud), 50.0), (ball, c.CShape(ball), -9.0)]
+    for shape, in_c, x in held:
+        assert own.add(in_c, c.identity_at(x, 0, 0)) == (c.OK, python.add(shape, c.identity_at(x, 0, 0)))
+    X_WS = np.stack([c.identity_at(x, 0, 0) for x in (-20.0, -5.0, 30.0, 30.0)])
+    directions = np.array([[2.0, 0, 0], [1.0, 0, 0], [1.0, 0, 0], [0.0, 1.0, 0]])
+    status, rows, statuses = own.cast(held[2][1], X_WS, directions)
+    assert status == c.UNSUPPORTED and statuses.tolist() == [c.OK, c.UNSUPPORTED, c.UNSUPPORTED, c.OK]
+    assert own.question_message.startswith("collide_world_cast: cast 1 and body 0: "), own.question_message
+    assert are_equal(python.shape_cast(ball, X_WS, directions).rows[[0, 3]], rows[[0, 3]]) and rows["body"][0] == 2
+    assert rows["ray"].tolist() == [0, 1, 2, 3] and not any(rows[1:3][name].any() for name in ("hit", "certified"))
+    assert own.cast(held[2][1], X_WS[1], directions[1], 1.0)[0] == c.OK
 
 
 # --- meshes and fields ------------------------------------------------------------------------------------------------
@@ -664,6 +760,13 @@ def test_refused_questions_name_what_is_to_blame():
         (lambda: own.query(ball, np.diag([1.0, 1, -1, 1]))[0], c.INVALID_POSE, "X_WS is no pose"),
         (lambda: own.raycast(zero, away)[0], c.INVALID_ARGUMENT, "directions_W[1] is 0"),
         (lambda: own.raycast([[math.nan, 0, 0]], [[1.0, 0, 0]])[0], c.INVALID_ARGUMENT, "origins_W[0]"),
+        (lambda: own.raycast(zero, [[1.0, 0, 0], [math.nan, 1, 0]])[0], c.INVALID_ARGUMENT, "directions_W[1]"),
+        (lambda: own.cast(ball, np.eye(4), away)[0], c.INVALID_ARGUMENT, "collide_world_cast: directions_W[1] is 0"),
+        (lambda: own.cast(ball, np.eye(4), [[0, math.nan, 1.0]])[0], c.INVALID_ARGUMENT, "directions_W[0] is 0, not"),
+        (lambda: own.cast(ball, np.diag([1.0, 2, 1, 1]), away[0])[0], c.INVALID_POSE, "X_WS[0] is no pose"),
+        (lambda: own.cast(ball, np.tile(np.eye(4), (3, 1, 1)), away)[0], c.INVALID_ARGUMENT, "counts are neither n"),
+        (lambda: own.cast(ball, np.eye(4), away[0], -1.0)[0], c.INVALID_ARGUMENT, "max_distance is below 0"),
+        (lambda: own.cast(ball, np.eye(4), away[0], flags=8)[0], c.INVALID_ARGUMENT, "a flag is none of casts"),
         (lambda: own.nearest([[0, 0, 0], [1e51, 0, 0]])[0], c.INVALID_ARGUMENT, "points_W[1]"),
         (lambda: own.boxes_near([0, 0, 1], [0, 0, 0])[0], c.INVALID_ARGUMENT, "low <= high"),
     ):

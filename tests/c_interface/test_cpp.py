@@ -261,6 +261,8 @@ int main() {
     world.remove(third);
     for (const auto &row : world.raycast(space, origins, ways).rows) say("world ray", row.body, row.distance);
     for (const auto &row : world.nearest(space, origins)) say("nearest", row.body, row.distance);
+    for (const auto &row : world.cast(space, ball, Pose::at(0.1, 0.0, 4.0), ways).rows)
+        say("world cast", row.body, row.distance);
     world.allow(std::vector<std::int32_t>{floor, top});
     say("allowed", world.collides(space));
     world.set_margins(std::vector<std::int32_t>{floor, last}, std::vector<double>{0.01, 10.0});
@@ -335,7 +337,8 @@ def _of_world(block, ball, rod, mesh, up, origins, ways) -> list[str]:
     lines += _said("box", [int(name) for name in world.boxes_near([-2, -1, -1], [0, 1, 1])])
     world.remove("2")
     rays, nearest = world.raycast(origins, ways), world.nearest(origins)
-    for what, found in (("world ray", rays), ("nearest", nearest)):
+    moved = world.shape_cast(ball, _at(0.1, 0, 4), ways)
+    for what, found in (("world ray", rays), ("nearest", nearest), ("world cast", moved)):
         lines += _said(what, [-1 if name is None else int(name) for name in found.names], found["distance"])
     world.allow("0", "1")
     lines += _said("allowed", world.collides())
