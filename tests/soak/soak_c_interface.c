@@ -887,13 +887,20 @@ static void ask_world(struct caller *c)
     size_t capacity = capacity_of(c), n = 1 + below(&c->s, 6), most = 1 + below(&c->s, 6), k;
     const collide_shape *S = A_SHAPE(c);
     uint32_t group = (uint32_t)next(&c->s), mask = (uint32_t)next(&c->s);
+    unsigned flags = one_in(&c->s, 40) ? (unsigned)next(&c->s) : one_in(&c->s, 2) ? COLLIDE_START_NORMALS : COLLIDE_TRUST_POSES;
     int filters = one_in(&c->s, 2);
+    collide_poses start = {X, 1};
+    collide_vectors along = {d, n};
     a_pose(c, X);
     for (k = 0; k < 18; k++) o[k] = coordinate(&c->s, 3.0), d[k] = coordinate(&c->s, 1.0);
     w = handle(c, w);
     c->is_bad = 0;
     switch (below(&c->s, 10)) {
-    case 0: ASK(c, 0, collide_world_collides(w, c->space, &c->reply->hit)); check_hit(c); return;
+    case 0:
+        if (one_in(&c->s, 2)) ASK(c, 0, collide_world_collides(w, c->space, &c->reply->hit));
+        else ASK(c, 0, collide_world_within(w, c->space, margin, &c->reply->hit));
+        check_hit(c);
+        return;
     case 1:
         ASK(c, capacity * 8, collide_world_hits(w, c->space, c->out, capacity, &c->reply->count));
         same_bytes(c, 8 * rows_written(c, capacity));
@@ -916,10 +923,14 @@ static void ask_world(struct caller *c)
             ASK(c, n * sizeof(collide_world_hit),
                 collide_world_raycast(w, c->space, o, d, n, limit, filters ? &group : NULL, filters ? &mask : NULL,
                                       c->out, c->reply->statuses));
-        else
+        else if (one_in(&c->s, 2))
             ASK(c, n * sizeof(collide_world_hit),
                 collide_world_nearest(w, c->space, o, n, limit, filters ? &group : NULL, filters ? &mask : NULL,
                                       c->out));
+        else
+            ASK(c, n * sizeof(collide_world_hit),
+                collide_world_cast(w, c->space, S, start, along, limit, flags, filters ? &group : NULL,
+                                   filters ? &mask : NULL, c->out, c->reply->statuses));
         for (k = 0; IS_OK(c) && k < n; k++) {
             const collide_world_hit *a = (const collide_world_hit *)(const void *)c->replies[0].rows + k;
             const collide_world_hit *b = (const collide_world_hit *)(const void *)c->replies[1].rows + k;
@@ -989,7 +1000,12 @@ static void change_world(struct caller *c)
         if (one_in(&c->s, 2)) status = collide_world_replace_mesh(c->world, ids[0], A_MESH(c));
         else status = collide_world_replace_field(c->world, ids[0], A_FIELD(c));
         break;
-    case 6: status = collide_world_sleep(c->world, ids, n, one_in(&c->s, 2)); break;
+    case 6:
+        for (k = 0; k < 8; k++) X[k] = margin_of(c);
+        if (one_in(&c->s, 3)) status = collide_world_set_margins(c->world, ids, n, X);
+        else if (one_in(&c->s, 2)) status = collide_world_set_pair_margins(c->world, ids, n, one_in(&c->s, 3) ? NULL : X);
+        else status = collide_world_sleep(c->world, ids, n, one_in(&c->s, 2));
+        break;
     default: status = collide_world_allow(c->world, ids, n);
     }
     count_status(c, status);
@@ -1059,6 +1075,15 @@ static void ask_robot(struct caller *c)
     for (k = 0; k < 2 * n * columns; k++) if (isfinite(q[k]) && fabs(q[k]) > 10.0) q[k] = 10.0;
     if (one_in(&c->s, 2)) for (k = n * columns; k < 2 * n * columns; k++) q[k] = q[k - n * columns] + between(&c->s, -0.1, 0.1);
 #define ROBOT_SPACE (c->space == NULL ? NULL : c->robot_spaces[c->reply - c->replies][number])
+    if (one_in(&c->s, 4)) { /* one body around moves, for both workspaces */
+        double X[16], Y[16];
+        int32_t body = -1 - (int32_t)below(&c->s, collide_robot_around(robot) + 1);
+        pose(&c->s, X, &c->is_bad);
+        c->is_bad = 0;
+        ASK(c, 0, collide_robot_move_around(ROBOT_SPACE, &body, 1, X, &c->reply->failed));
+        if (IS_OK(c)) EXPECT(collide_robot_pose_around(c->robot_spaces[0][number], body, Y) == COLLIDE_OK &&
+                             memcmp(X, Y, sizeof Y) == 0, "a body around is not where it was moved");
+    }
     switch (below(&c->s, 5)) {
     case 0:
         ASK(c, n, collide_robot_collide(ROBOT_SPACE, q, n, c->out, c->reply->statuses, &c->reply->failed));
