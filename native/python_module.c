@@ -4,7 +4,6 @@
 
    The library is opened by its path, after Python has looked at its size and checksum. Numpy's arrays are read through
    numpy's own C interface. */
-#define PY_SSIZE_T_CLEAN
 #include <Python.h>
 
 #define NPY_NO_DEPRECATED_API NPY_1_7_API_VERSION

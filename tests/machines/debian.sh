@@ -48,8 +48,10 @@ unpacked() { # SUITE ARCHITECTURE FOLDER PACKAGE...: the packages' files
 }
 
 packages_for() { # FOLDER PLATFORM VERSION ABI PACKAGE...: of PyPI, for a Python in which no pip runs; ABI "" is any
-    local kind=(--platform "$2")
-    [ "$2" = win_amd64 ] || kind=(--platform "manylinux_2_28_$2" --platform "manylinux_2_27_$2" --platform "manylinux2014_$2")
+    local kind=(--platform "$2") # a platform's whole name; for Linux the kind of processor
+    case $2 in
+        x86_64 | aarch64) kind=(--platform "manylinux_2_28_$2" --platform "manylinux_2_27_$2" --platform "manylinux2014_$2") ;;
+    esac
     python -m pip install --quiet --disable-pip-version-check --target "$1" --only-binary :all: --ignore-requires-python \
         --implementation cp --python-version "$3" ${4:+--abi "$4"} "${kind[@]}" "${@:5}"
 }
@@ -62,7 +64,7 @@ python_source() { # SUITE PACKAGE FOLDER: the sources of a Python, as they are w
         mkdir -p "$work/sources"
         cd "$work/sources"
         apt-get -q source --download-only "$2" > log 2>&1 || { cat log; exit 1; }
-        dpkg-source --no-check --skip-patches -x "$2"_*.dsc "$3" > log
+        dpkg-source --no-check --no-copy --skip-patches -x "$2"_*.dsc "$3" > log
     ) || skip "Debian's archive has no sources of $2"
 }
 

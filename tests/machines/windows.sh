@@ -9,6 +9,7 @@ cd "$(dirname "$0")/../.."
 . tests/machines/debian.sh
 wine=$(command -v wine64 || command -v wine || ls /usr/lib/wine/wine64 2> /dev/null) ||
     skip "no wine: apt-get install wine64"
+need nm binutils
 sources=$work/python-source site=$work/windows-site
 python_source trixie python3.13 "$sources"
 rm -rf "$site"
@@ -20,7 +21,7 @@ cp -r "$sources/Include/." "$work/windows-include"
 sed 's/^#undef Py_GIL_DISABLED$//;s/@.*@//' "$sources/PC/pyconfig.h.in" > "$work/windows-include/pyconfig.h"
 COLLIDE_INCLUDE=$work/windows-include:$site/numpy/_core/include wheel_of win32-amd64
 python -m zipfile -e "$wheel" "$site"
-
+python tests/machines/dynamic_libraries.py "$wheel"
 python - "$sources/PC/python3dll.c" build/kernels/python3/python3.def << 'PYTHON'
 import re, sys
 from pathlib import Path
