@@ -189,7 +189,8 @@ class BuildLibrary(build_ext):
         command = getattr(self.compiler, "compiler_so", None)
         if not command:
             return self.compiler.compiler_type  # of Windows: whose version is that of the build's environment
-        asked = [*self._c_command, "--version"]
+        # Asked as clang is, zig leaves an empty file in the folder.
+        asked = [sys.executable, "-m", "ziglang", "version"] if self.by_zig else [*self._c_command, "--version"]
         return repr(command) + subprocess.run(asked, stdout=subprocess.PIPE, check=True, text=True).stdout
 
     @property
