@@ -86,6 +86,7 @@ if TYPE_CHECKING:
     from collide.solids.configuration_obstacle import ConfigurationObstacle, configuration_obstacle
     from collide.solids.overlap_volume import OverlapVolume, overlap_volume
     from collide.solids.planar_obstacle import PlanarObstacle
+    from collide.solids.repair import RepairedMesh, repaired
     from collide.spheres.enclosing_spheres import EnclosingSpheres, enclosing_spheres
     from collide.spheres.facets_outside import PieceAudit
     from collide.spheres.piece_audit import audit_pieces
@@ -154,6 +155,7 @@ _HOMES = {
     "collide.solids.configuration_obstacle": ("ConfigurationObstacle", "configuration_obstacle"),
     "collide.solids.overlap_volume": ("OverlapVolume", "overlap_volume"),
     "collide.solids.planar_obstacle": ("PlanarObstacle",),
+    "collide.solids.repair": ("RepairedMesh", "repaired"),
     "collide.sweeps.configurations": ("DrawnConfigurations",),
     "collide.sweeps.pair_proposal": ("LinkPair", "Proposal", "propose_disabled_pairs"),
     "collide.sweeps.sweep": ("sweep",),
@@ -179,14 +181,14 @@ __all__ = [
     "DrawnConfigurations", "Ellipsoid", "EnclosingSpheres", "FacetPairs", "GridDistances", "HPolytope", "Halfspace",
     "HeightField", "How", "InvalidArgument", "InvalidPose", "InvalidShape", "LinkPair", "Located", "Mesh",
     "MissingExtra", "MotionPlan", "OcTree", "OcTreeLeaves", "OverlapVolume", "Overlay", "PairResult",
-    "PartitionSize", "PieceAudit", "PlanarObstacle", "Plane", "PointCloud", "Portals", "Proposal", "RayHits", "Robot",
-    "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet",
-    "SignedDistanceGrid", "SignedDistances", "SpacePartition", "Sphere", "Spline", "SweepResults", "SweptMesh",
-    "TetMesh", "TimeOfImpact", "UnknownBody", "UnsupportedQuery", "VoxelGrid", "World", "WorldHits", "WorldResult",
-    "audit_pieces", "boolean", "certify", "collide", "combine", "configuration_obstacle", "contacts", "contains",
-    "distance", "enclosing_spheres", "facet_pairs", "get_include", "get_library", "moved_poses", "overlap_volume",
-    "overlapping_cells", "overlay", "plan", "pose", "poses", "poses_in_motion", "propose_disabled_pairs", "raycast",
-    "read_sweep", "self_collisions",
+    "PartitionSize", "PieceAudit", "PlanarObstacle", "Plane", "PointCloud", "Portals", "Proposal", "RayHits",
+    "RepairedMesh", "Robot", "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions", "Shape",
+    "ShapeCasts", "ShapeSet", "SignedDistanceGrid", "SignedDistances", "SpacePartition", "Sphere", "Spline",
+    "SweepResults", "SweptMesh", "TetMesh", "TimeOfImpact", "UnknownBody", "UnsupportedQuery", "VoxelGrid", "World",
+    "WorldHits", "WorldResult", "audit_pieces", "boolean", "certify", "collide", "combine",
+    "configuration_obstacle", "contacts", "contains", "distance", "enclosing_spheres", "facet_pairs", "get_include",
+    "get_library", "moved_poses", "overlap_volume", "overlapping_cells", "overlay", "plan", "pose", "poses",
+    "poses_in_motion", "propose_disabled_pairs", "raycast", "read_sweep", "repaired", "self_collisions",
     "self_overlapping_cells", "shape_cast", "signed_distances", "sweep", "tessellate", "time_of_impact", "verify",
     "walk",
 ]

@@ -85,6 +85,7 @@ _REPORT = """examples:
   collide report planning_scene.yaml --robot panda.urdf --state start,goal
   collide report robot.urdf cell.yaml --trajectory plan.csv --clearance 2cm
   collide report part_a.stl part_b.obj --scale mm --meshes pieces
+  collide report robot.urdf --repair              solids of meshes with small holes
   collide report scene.yaml --json - | jq '.colliding[] | [.a, .b, .depth]'
   collide report panda_workbench --html page.html       to look at, in a browser
 
@@ -285,8 +286,13 @@ def _scene_arguments(parser: argparse.ArgumentParser, at_least: int = 1) -> None
     )
     group.add_argument("--robot", metavar="FILE", help="the robot of a planning scene: URDF, MJCF or SDFormat")
     group.add_argument("--srdf", metavar="FILE", help="disabled pairs and named states (default: beside the robot)")
-    group.add_argument("--meshes", choices=("mesh", "hull", "pieces"),
-                       help="how meshes enter: as they are (default), as convex hulls, or as unions of convex pieces")
+    kind = group.add_mutually_exclusive_group()
+    kind.add_argument("--meshes", choices=("mesh", "repaired", "hull", "pieces"),
+                      help="how meshes enter: as they are (default), repaired, as convex hulls, or as unions of convex "
+                           "pieces")
+    kind.add_argument("--repair", action="store_const", const="repaired", dest="meshes",
+                      help="--meshes repaired: make solids of broken meshes (holes, facets turned over, repeats), and "
+                           "say what was done")
     group.add_argument("--missing-meshes", choices=("error", "skip"),
                        help="what to do about mesh files that are missing")
     group.add_argument("--package-path", action="append", metavar="DIR",

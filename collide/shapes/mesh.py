@@ -20,6 +20,7 @@ from collide.transforms import SMALLEST
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from collide import RepairedMesh
     from collide.hull import exact_hull
     from collide.mesh import build_bvh, fine_boxes, mesh_survey, scaled_bvh, solid_measures
     from collide.mesh import locality as local_stretch
@@ -339,6 +340,42 @@ class Mesh(Shape):
         )
         made = Mesh(points, faces, solid=plain.solid)
         return LocalisedMesh(made, source, moved, before, made.locality(progress=progress))
+
+    def repaired(
+        self, *, weld: float | None = None, widest_hole: float | None = None, crossings: bool = True, progress=None,
+        time_limit: float | None = None, memory: int | None = None,
+    ) -> RepairedMesh:
+        """The mesh as a solid without crossing facets, as far as that is safe, and a report: `collide.repaired`.
+
+        Parameters
+        ----------
+        weld : float, optional
+            Vertices at open edges are joined within this distance [m]; by default 1e-6 of the box's diagonal.
+        widest_hole : float, optional
+            The widest hole to close [m], the diagonal of a square hole; by default a tenth of the box's diagonal.
+        crossings : bool
+            Resolve facets that cross, by winding numbers.
+        progress, time_limit, memory
+            As of `collide.boolean`.
+
+        Returns
+        -------
+        RepairedMesh
+            The new mesh, its source facets, and every step: ``print(mesh.repaired().report)``.
+
+        Raises
+        ------
+        InvalidArgument
+            For arguments out of range.
+        UnsupportedQuery
+            Where a limit was reached.
+        """
+        from collide import repaired  # its arrangement is of a room that needs shapes
+
+        return repaired(
+            self, weld=weld, widest_hole=widest_hole, crossings=crossings, progress=progress, time_limit=time_limit,
+            memory=memory,
+        )
 
     def save(self, path) -> None:
         """Write the mesh to a file: whole as ``.npz``, or its triangles in a form for other programs.

@@ -71,10 +71,10 @@ def load(
         For MoveIt planning scenes: the robot, or its file.
     srdf : str, Path or bool, optional
         The SRDF of a URDF; None looks beside it, False does without.
-    meshes : {"mesh", "hull", "pieces"}
-        "mesh": triangles as they are, a `collide.Mesh`, solid where they close; "hull": the convex hull of the
-        vertices; "pieces": a union of convex pieces (coacd). Each body's ``approximation`` says what the last two leave
-        out.
+    meshes : {"mesh", "repaired", "hull", "pieces"}
+        "mesh": triangles as they are, a `collide.Mesh`, solid where they close; "repaired": the same, meshes that are
+        no solids repaired as by `collide.repaired`; "hull": the convex hull of the vertices; "pieces": a union of
+        convex pieces (coacd). Each body's ``approximation`` says what was repaired, or what the last two leave out.
     package_path : str, Path or iterable of them
         Folders in which ``package://`` names are looked for first.
     scale : float, optional

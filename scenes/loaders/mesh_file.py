@@ -19,8 +19,11 @@ from collide.scenes import mesh_cache as cache
 from collide.scenes.loaders.mesh_parts import MeshFile, MeshPart, described, distinct
 from collide.scenes.loaders.triangles import SUFFIXES, MeshBytes, open_mesh, triangles_of
 
-#: What a mesh may become: itself, the hull of its vertices, or a union of convex pieces.
-OPTIONS = ("mesh", "hull", "pieces")
+#: What a mesh may become: itself, itself repaired, the hull of its vertices, or a union of convex pieces.
+OPTIONS = ("mesh", "repaired", "hull", "pieces")
+REPAIRED = "repaired"
+#: Those that keep its facets.
+AS_THEY_ARE = ("mesh", REPAIRED)
 #: A mesh whose volume is this much of its hull's is its hull.
 CONVEX_RATIO = 1.0 - 1e-6
 
@@ -28,18 +31,19 @@ CONVEX_RATIO = 1.0 - 1e-6
 def read_mesh(path: Path, meshes: str = "mesh") -> MeshFile:
     """The meshes of a file, from the cache of prepared inputs or by its reader.
 
-    meshes : "mesh" for the triangles, "hull", or "pieces" for a convex decomposition of every mesh.
+    meshes : "mesh" for the triangles, "repaired" for those of a solid where one can be made of them, "hull", or
+        "pieces" for a convex decomposition of every mesh.
     """
     check_meshes_option(meshes)
     if path.suffix.lower() not in SUFFIXES:
         raise SceneError(f"unknown mesh format {path.suffix!r}; known are {', '.join(SUFFIXES)}", path=path)
     opened = open_mesh(path)
     # Without scipy the volume of a hull is unknown; once it is installed the mesh is looked at again.
-    known = meshes != "mesh" and importlib.util.find_spec("scipy") is not None
+    known = meshes not in AS_THEY_ARE and importlib.util.find_spec("scipy") is not None
     entry = cache.key(opened.blobs, {"meshes": meshes, "suffix": opened.suffix, "volumes": known})
     file = _from_cache(entry)
     if file is None:
-        file, raw = _read(opened, meshes == "mesh")
+        file, raw = _read(opened, meshes)
         if meshes == "pieces":
             for part, (vertices, faces) in zip(file.parts, raw):
                 part.pieces = _decompose(vertices, faces, path)
@@ -61,7 +65,7 @@ def _from_cache(entry: str) -> MeshFile | None:
 
 def check_meshes_option(meshes: str) -> None:
     if not isinstance(meshes, str) or meshes not in OPTIONS:
-        raise SceneError(f'meshes must be "mesh", "hull" or "pieces", got {checks.brief(meshes)}')
+        raise SceneError(f'meshes must be "mesh", "repaired", "hull" or "pieces", got {checks.brief(meshes)}')
 
 
 def size_note(extent: float, what: str) -> str | None:
@@ -78,13 +82,13 @@ def size_note(extent: float, what: str) -> str | None:
 # --- reading ------------------------------------------------------------------------------------
 
 
-def _read(opened: MeshBytes, as_it_is: bool) -> tuple[MeshFile, list[tuple[np.ndarray, np.ndarray]]]:
+def _read(opened: MeshBytes, meshes: str) -> tuple[MeshFile, list[tuple[np.ndarray, np.ndarray]]]:
     triangles, notes = triangles_of(opened)
     path, notes = opened.path, list(notes)
     parts, raw = [], []
     for name, vertices, faces in triangles:
         if len(vertices):
-            part, about = _describe(as_it_is, name, vertices, faces, path)
+            part, about = _describe(meshes, name, vertices, faces, path)
             parts.append(part)
             raw.append((vertices, faces))
             notes += about
@@ -96,7 +100,7 @@ def _read(opened: MeshBytes, as_it_is: bool) -> tuple[MeshFile, list[tuple[np.nd
 
 
 def _describe(
-    as_it_is: bool, label: str, vertices: np.ndarray, faces: np.ndarray, path: Path
+    meshes: str, label: str, vertices: np.ndarray, faces: np.ndarray, path: Path
 ) -> tuple[MeshPart, list[str]]:
     if not np.isfinite(vertices).all():
         row = int(np.argmax(~np.isfinite(vertices).all(axis=1)))
@@ -113,16 +117,16 @@ def _describe(
         notes.append(f"{len(vertices) - len(used)} vertices that no face uses were left out")
     if not len(faces):
         notes.append("has points but no faces; their hull was taken")
-    elif as_it_is:
-        return _as_it_is(label, vertices, faces, path), notes
+    elif meshes in AS_THEY_ARE:
+        return _as_it_is(label, vertices, faces, path, meshes == REPAIRED), notes
     closed, fill = _volumes(vertices, faces, path)
     return MeshPart(label, distinct(vertices[used]), fill, closed, len(faces)), notes
 
 
 def part_of_arrays(label: str, vertices: np.ndarray, faces: np.ndarray, meshes: str, path: Path) -> MeshPart:
     """A mesh that another reader has read, (n, 3) vertices and (m, 3) faces, taken as `read_mesh` takes one."""
-    part = _as_it_is(label, vertices, faces, path)
-    if meshes == "mesh":
+    part = _as_it_is(label, vertices, faces, path, meshes == REPAIRED)
+    if meshes in AS_THEY_ARE:
         return part
     whole = MeshPart(label, distinct(vertices[np.unique(faces)]), np.nan, part.closed, part.faces)
     if part.own_hull:
@@ -132,9 +136,9 @@ def part_of_arrays(label: str, vertices: np.ndarray, faces: np.ndarray, meshes: 
     return whole
 
 
-def _as_it_is(label: str, vertices: np.ndarray, faces: np.ndarray, path: Path) -> MeshPart:
+def _as_it_is(label: str, vertices: np.ndarray, faces: np.ndarray, path: Path, repair: bool) -> MeshPart:
     try:
-        return described(label, vertices, faces)
+        return described(label, vertices, faces, repair)
     except InvalidShape as error:
         raise SceneError(str(error), path=path, element=None if label == path.name else label) from None
 
@@ -187,7 +191,7 @@ def _pack(file: MeshFile) -> dict[str, np.ndarray]:
         about["parts"].append(
             {
                 "name": part.name, "fill": fill, "closed": bool(part.closed), "faces": part.faces, "pieces": pieces,
-                "own_hull": bool(part.own_hull),
+                "own_hull": bool(part.own_hull), "repairs": part.repairs,
             }
         )
         arrays[f"points{k}"] = part.points
@@ -208,7 +212,10 @@ def _unpack(arrays: Mapping[str, np.ndarray]) -> MeshFile:
         points = _points(arrays[f"points{k}"])
         facets = _facets(arrays[f"facets{k}"], len(points)) if f"facets{k}" in arrays else None
         parts.append(
-            MeshPart(text["name"], points, fill, text["closed"], text["faces"], pieces, facets, bool(text["own_hull"]))
+            MeshPart(
+                text["name"], points, fill, text["closed"], text["faces"], pieces, facets, bool(text["own_hull"]),
+                repairs=text["repairs"],
+            )
         )
     return MeshFile(parts, list(about["notes"]))
 

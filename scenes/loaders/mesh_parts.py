@@ -10,6 +10,9 @@ from collide.mesh.convex_surface import is_own_hull
 from collide.shapes.mesh import Mesh
 from collide.shapes.shape import Shape
 
+#: Begins a line about a defect that stays.
+NOT_REPAIRED = "not repaired: "
+
 
 @dataclass
 class MeshPart:
@@ -22,6 +25,7 @@ class MeshPart:
     pieces : the convex pieces as point sets, where a decomposition was asked for.
     facets : (faces, 3) rows of ``points``, as the file has them, where the mesh is taken as it is.
     own_hull : these are exactly the surface of their convex hull.   made : shapes made of it, by scale.
+    repairs : the steps of its repair in words, with facet numbers; None where none was asked for.
     """
 
     name: str
@@ -33,6 +37,7 @@ class MeshPart:
     facets: np.ndarray | None = None
     own_hull: bool = False
     made: dict[tuple, Shape] = field(default_factory=dict)
+    repairs: list[str] | None = None
 
 
 @dataclass
@@ -49,12 +54,24 @@ def distinct(vertices: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(vertices[np.sort(first)] + 0.0)
 
 
-def described(name: str, vertices: np.ndarray, faces: np.ndarray) -> MeshPart:
-    """A part that is to be taken as it is: equal vertices joined, and looked at. Raises InvalidShape."""
+def described(name: str, vertices: np.ndarray, faces: np.ndarray, repair: bool = False) -> MeshPart:
+    """A part that is to be taken as it is: equal vertices joined, and looked at. Raises InvalidShape.
+
+    repair : whether a mesh that is no solid is repaired. Facets that cross stay: no answer depends on them.
+    """
     points, ids = _welded(vertices, faces)
-    mesh = Mesh(points, ids)
+    mesh, repairs = Mesh(points, ids), None
+    if repair:
+        repairs = []
+        if not mesh.solid:
+            made = mesh.repaired(crossings=False)
+            repairs = made.report.steps() + [f"{NOT_REPAIRED}{entry}" for entry in made.report.unrepaired[:1]]
+            if made.report.changed:
+                mesh = Mesh(*_welded(made.mesh.vertices, made.mesh.faces))
     own_hull = mesh.solid and is_own_hull(mesh.vertices, mesh.faces)
-    return MeshPart(name, points, np.nan, mesh.solid, len(ids), facets=mesh.faces, own_hull=own_hull)
+    return MeshPart(
+        name, mesh.vertices, np.nan, mesh.solid, len(mesh.faces), facets=mesh.faces, own_hull=own_hull, repairs=repairs
+    )
 
 
 def _welded(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

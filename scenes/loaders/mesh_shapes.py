@@ -13,8 +13,8 @@ import numpy as np
 
 from collide.errors import InvalidShape, SceneError
 from collide.mesh.convex_surface import is_own_hull
-from collide.scenes.loaders.mesh_file import CONVEX_RATIO
-from collide.scenes.loaders.mesh_parts import MeshFile, MeshPart, described, distinct
+from collide.scenes.loaders.mesh_file import AS_THEY_ARE, CONVEX_RATIO, REPAIRED
+from collide.scenes.loaders.mesh_parts import NOT_REPAIRED, MeshFile, MeshPart, described, distinct
 from collide.shapes.compound import Compound
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.mesh import Mesh
@@ -39,7 +39,7 @@ def part_shape(part: MeshPart, scale, place: str) -> Taken:
         if part.pieces is not None and not _is_convex(part):
             return Taken(_union([ConvexHull(_times(points, factors)) for points in part.pieces]), _about_pieces(part))
         if part.facets is not None:
-            return Taken(_as_it_is(part, factors), None)
+            return Taken(_as_it_is(part, factors), _about_repairs(part))
         return Taken(ConvexHull(_times(part.points, factors)), _about_hull(part))
     except InvalidShape as error:
         raise InvalidShape(f"{place}: {error}") from None
@@ -85,15 +85,15 @@ def element_shapes(file: MeshFile, scale, place: str) -> list[Taken]:
 def inline_shape(vertices: np.ndarray, faces: np.ndarray, meshes: str, place: str) -> Taken:
     """A mesh that a scene file holds itself: (n, 3) vertices, and (m, 3) facets, of which there may be none.
 
-    meshes : "mesh", or anything else for the hull of the vertices. Raises SceneError for ids out of range.
+    meshes : "mesh", "repaired", or anything else for the hull of the vertices. Raises SceneError for ids out of range.
     """
-    if meshes == "mesh" and len(faces):
+    if meshes in AS_THEY_ARE and len(faces):
         if (outside := ((faces < 0) | (faces >= len(vertices))).any(axis=1)).any():
             row = int(np.argmax(outside))
             raise SceneError(
                 f"triangle {row} names vertices {faces[row].tolist()}, but there are {len(vertices)}", element=place
             )
-        return part_shape(described("mesh", vertices, faces), 1.0, place)
+        return part_shape(described("mesh", vertices, faces, repair=meshes == REPAIRED), 1.0, place)
     hull = ConvexHull(vertices).without_repeats()
     return Taken(hull, f"hull of {len(hull.points)} vertices of a mesh in the file")
 
@@ -120,7 +120,11 @@ def _joined(parts: list[MeshPart]) -> MeshPart:
         return parts[0]
     starts = np.cumsum([0, *(len(part.points) for part in parts)])
     faces = np.concatenate([part.facets + start for part, start in zip(parts, starts.tolist())])  # type: ignore[operator]
-    return described(parts[0].name, np.concatenate([part.points for part in parts]), faces)
+    repair = any(part.repairs is not None for part in parts)
+    joined = described(parts[0].name, np.concatenate([part.points for part in parts]), faces, repair)
+    if repair:
+        joined.repairs = [line for part in parts for line in _of_part(part)] + (joined.repairs or [])
+    return joined
 
 
 def _joined_points(parts: list[MeshPart]) -> MeshPart:
@@ -133,6 +137,18 @@ def _union(hulls: list[ConvexHull]) -> Shape:
 
 
 # --- what a shape leaves out ----------------------------------------------------------------------
+
+
+def _about_repairs(part: MeshPart) -> str | None:
+    """The steps; of a mesh that stays as it is, why."""
+    steps = part.repairs or []
+    changed = any(not line.startswith(NOT_REPAIRED) for line in steps)
+    return f"{'repaired: ' if changed else ''}{'; '.join(steps)}" if steps else None
+
+
+def _of_part(part: MeshPart) -> list[str]:
+    """What was repaired of a part of several, by its name; what stays broken the whole has to say."""
+    return [f"{part.name}: {line}" for line in part.repairs or () if not line.startswith(NOT_REPAIRED)]
 
 
 def _about_hull(part: MeshPart) -> str | None:

@@ -142,7 +142,7 @@ def _centred(part: MeshPart) -> MeshPart:
     """A part moved so that the middle of its bounding box is at the origin, as Gazebo moves it."""
     middle = 0.5 * (part.points.min(axis=0) + part.points.max(axis=0))
     if part.facets is not None:
-        return described(part.name, part.points - middle, part.facets)
+        return replace(described(part.name, part.points - middle, part.facets), repairs=part.repairs)
     return replace(
         part, points=part.points - middle, pieces=part.pieces and [piece - middle for piece in part.pieces], made={}
     )

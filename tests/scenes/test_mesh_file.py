@@ -100,7 +100,7 @@ def test_pieces(tmp_path):
         (body,) = load(tmp_path / "l.stl", meshes="pieces").bodies
         assert isinstance(body.shape, Compound) and len(body.shape.items) >= 2
         assert body.approximation == f"{len(body.shape.items)} convex pieces of a mesh of 12 vertices (coacd)"
-    with pytest.raises(SceneError, match='meshes must be "mesh", "hull" or "pieces", got \'tetra\''):
+    with pytest.raises(SceneError, match='meshes must be "mesh", "repaired", "hull" or "pieces", got \'tetra\''):
         load(tmp_path / "l.stl", meshes="tetra")
 
 

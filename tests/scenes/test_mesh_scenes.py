@@ -151,9 +151,65 @@ def test_the_scene_file_chooses(tmp_path):
     scene["bodies"][1]["shape"]["mesh"]["as"] = "hulls"
     (tmp_path / "s.json").write_text(json.dumps(scene))
     with pytest.raises(
-        Exception, match=r"mesh\.as: must be one of mesh, hull, pieces, got 'hulls' \(did you mean 'hull'\?\)"
+        Exception, match=r"mesh\.as: must be one of mesh, repaired, hull, pieces, got 'hulls' \(did you mean 'hull'\?\)"
     ):
         load(tmp_path / "s.json")
+
+
+def small_box(lid: bool = True) -> tuple[np.ndarray, np.ndarray]:
+    """A box of a tenth beside the L, with or without its two facets at z = 0.1."""
+    box = trimesh.creation.box((0.1, 0.1, 0.1))
+    vertices, faces = box.vertices + np.array([1.5, 1.5, 0.05]), np.asarray(box.faces)
+    return vertices, faces if lid else faces[(vertices[faces][:, :, 2] < 0.09).any(axis=1)]
+
+
+def test_broken_meshes_are_repaired_on_request_and_told(tmp_path, capsys):
+    """By part, and once more as the whole link: a hole that is wide for a part may be small for the link."""
+    vertices, faces = l_solid()
+    faces[3] = faces[3, ::-1]
+    write_obj(tmp_path / "l.obj", (vertices, faces), small_box(lid=False))
+    file = str(urdf(tmp_path, "l.obj"))
+    (body,) = load(file).bodies
+    assert not any(part.solid for part in getattr(body.shape, "items", [body.shape]) if isinstance(part, Mesh))
+    assert body.approximation is None
+    (body,) = load(file, meshes="repaired").bodies
+    assert body.shape.solid and body.shape.volume == pytest.approx(1.751)
+    assert body.approximation.startswith("repaired: part0: turned over: facet 3; closed 1 hole, ")
+    assert load(file, meshes="repaired").bodies[0].approximation == body.approximation, "from the cache"
+    assert main(["report", file, "--repair", "--json", "-"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert [entry["what"] for entry in told["approximations"]] == [body.approximation]
+    assert [entry["solid"] for entry in told["meshes"]] == [True]
+    main(["report", file, "--repair"])
+    assert "repaired: part0: turned over: facet 3" in " ".join(capsys.readouterr().out.split())
+    assert main(["check", file, "--repair", "--meshes", "hull"]) == 2
+    assert "not allowed with argument" in capsys.readouterr().err
+
+
+def test_meshes_beyond_repair_say_why(tmp_path):
+    write_obj(tmp_path / "open.obj", small_box(lid=False))
+    (body,) = load(tmp_path / "open.obj", meshes="repaired").bodies
+    assert not body.shape.solid
+    assert body.approximation.startswith("not repaired: open edges: a hole of 4 edges, 81.6 % of the size long")
+    write_obj(tmp_path / "whole.obj", small_box(), l_solid())
+    assert [body.approximation for body in load(tmp_path / "whole.obj", meshes="repaired").bodies] == [None, None]
+
+
+def test_shapes_of_scene_files_say_that_they_are_repaired(tmp_path):
+    vertices, faces = l_solid()
+    faces[3] = faces[3, ::-1]
+    write_obj(tmp_path / "l.obj", (vertices, faces))
+    inline = {"vertices": vertices.tolist(), "faces": faces.tolist()}
+    scene = {
+        "collide": 1,
+        "bodies": [
+            {"name": "file", "shape": {"mesh": {"file": "l.obj", "as": "repaired", "scale": 0.5}}},
+            {"name": "as it is", "shape": {"mesh": {"file": "l.obj"}}},
+            {"name": "inline", "shape": {"mesh": inline}},
+        ],
+    }
+    (tmp_path / "s.json").write_text(json.dumps(scene))
+    assert [body.shape.solid for body in load(tmp_path / "s.json").bodies] == [True, False, False]
 
 
 def test_planning_scenes_hold_meshes_themselves(tmp_path):
