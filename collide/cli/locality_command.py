@@ -33,18 +33,19 @@ count as neighbours.
 
 exit status: 0 measured, 2 error"""
 
-_SUFFIXES = (".obj", ".ply", ".stl")
+_SUFFIXES = (".stl", ".ply", ".obj", ".off", ".3mf", ".glb")
 
 
 def add_arguments(parser) -> None:
     """Those of its own."""
     parser.add_argument(
-        "meshes", nargs="+", metavar="MESH", help="a mesh file: PLY, STL, OBJ, OFF, DAE, GLB, glTF; .gz too"
+        "meshes", nargs="+", metavar="MESH", help="a mesh file: PLY, STL, OBJ, OFF, 3MF, DAE, GLB, glTF; .gz too"
     )
     parser.add_argument("--plot", metavar="FILE", help="draw the distributions: a .png, .svg or .pdf file")
     parser.add_argument("--repeated", action="store_true",
                         help="count vertices with equal coordinates one by one, as Table 1 of the paper does")
-    parser.add_argument("--localised", metavar="FILE", help="make the mesh local, and write it: .obj, .ply, .stl")
+    parser.add_argument("--localised", metavar="FILE",
+                        help="make the mesh local, and write it: .stl, .ply, .obj, .off, .3mf, .glb")
     parser.add_argument("--stretch", type=float, default=10.0, metavar="S",
                         help="with --localised: the largest local stretch, 3.2 or more (10)")
     parser.add_argument("--order", type=int, default=1, metavar="K",

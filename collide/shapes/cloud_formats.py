@@ -41,5 +41,5 @@ def _text(points: np.ndarray) -> Iterator[bytes]:
 
 #: What a cloud can be written as, by the suffix of the file.
 SUFFIXES: dict[str, Callable[[np.ndarray], Iterator[bytes]]] = {
-    ".pcd": _pcd, ".ply": lambda points: mesh_formats.SUFFIXES[".ply"](points, _NO_FACES), ".xyz": _text,
+    ".pcd": _pcd, ".ply": lambda points: mesh_formats.SUFFIXES[".ply"](points, _NO_FACES, None), ".xyz": _text,
 }

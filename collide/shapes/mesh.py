@@ -383,24 +383,21 @@ class Mesh(Shape):
         Parameters
         ----------
         path : str or Path
-            The file. ``.npz``, or no suffix: vertices, faces, ``solid`` and ``scale``, which `load` reads. ``.ply``,
-            ``.obj`` and ``.stl``: the triangles, which ``collide.scenes.load`` reads as the same doubles; STL is
-            binary where its numbers of 32 bits are the coordinates, else text. An existing file is replaced, by all
-            of the new file or not at all.
+            The file. ``.npz``, or no suffix: vertices, faces, ``solid`` and ``scale``, which `load` reads. ``.stl``,
+            ``.ply``, ``.obj``, ``.off``, ``.3mf`` and ``.glb``: the triangles, for ``collide.scenes.load`` too, in
+            metres. All but GLB hold the same doubles; STL is binary where its numbers of 32 bits are the coordinates,
+            else text. GLB rounds to 32 bits, relative to the box's middle, and a warning of the logger "collide" says
+            how far. An existing file is replaced, by all of the new file or not at all.
 
         Raises
         ------
         InvalidShape
             Where the suffix is another, and where the file cannot be written.
         """
-        suffix = shape_suffix("Mesh", path, *mesh_formats.SUFFIXES)
-        if suffix in mesh_formats.SUFFIXES:
-            with refused_as_shape("Mesh.save", path):
-                mesh_formats.write_triangles(path, self.vertices, self.faces, suffix)
-            return
-        arrays = {name: np.asarray(getattr(self.base, name)) for name in ("vertices", "faces")}
-        arrays.update(solid=np.array(self.solid), scale=np.array(self.scale))
-        write_arrays("Mesh", path, _FILE_FORMAT, arrays)
+        if not save_triangles("Mesh", path, self.vertices, self.faces):
+            arrays = {name: np.asarray(getattr(self.base, name)) for name in ("vertices", "faces")}
+            arrays.update(solid=np.array(self.solid), scale=np.array(self.scale))
+            write_arrays("Mesh", path, _FILE_FORMAT, arrays)
 
     @classmethod
     def load(cls, path) -> Mesh:
@@ -437,6 +434,19 @@ _FILE_FIELDS = {
     "vertices": Field("f8", (None, 3)), "faces": Field("i4", (None, 3)), "solid": Field("b1", ()),
     "scale": Field("f8", ()),
 }
+
+
+def save_triangles(who: str, path, vertices: np.ndarray, faces: np.ndarray, body: np.ndarray | None = None) -> bool:
+    """Write triangles as the suffix says; False, and nothing written, for the suffix of arrays.
+
+    who : the calling class, for messages.   body : (m,) of every facet, for colours, or ``None``.
+    """
+    suffix = shape_suffix(who, path, *mesh_formats.SUFFIXES)
+    if suffix not in mesh_formats.SUFFIXES:
+        return False
+    with refused_as_shape(f"{who}.save", path):
+        mesh_formats.write_triangles(path, vertices, faces, suffix, body)
+    return True
 
 
 def corners_of_facets(mesh: Mesh) -> np.ndarray:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.errors import InvalidArgument, brief
-from collide.shapes.mesh import Mesh
+from collide.shapes.mesh import Mesh, save_triangles
 from collide.shapes.shape import Shape
 from collide.solids.arrangement import Arrangement, arrange, crossings_of
 from collide.solids.clean_mesh import clean_mesh
@@ -62,6 +62,23 @@ class BooleanResult(NamedTuple):
         Clean rounding leaves no crossing facets, but for results told here.
         """
         return np.zeros((0, 2), dtype=np.int64) if self.mesh is None else crossings_of(self.mesh)
+
+    def save(self, path) -> None:
+        """Write the mesh as `Mesh.save` does, facets in the colours of their bodies of origin.
+
+        Parameters
+        ----------
+        path : the file. PLY, OFF, 3MF and GLB have colours, OBJ a group for each body; STL and ``.npz`` have neither.
+
+        Raises
+        ------
+        InvalidArgument : the result is empty.
+        InvalidShape : another suffix; the file cannot be written.
+        """
+        if self.mesh is None:
+            raise InvalidArgument("BooleanResult.save: nothing is inside: the result is empty, and no file was written")
+        if not save_triangles("BooleanResult", path, self.mesh.vertices, self.mesh.faces, self.body):
+            self.mesh.save(path)
 
 
 def boolean(

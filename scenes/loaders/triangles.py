@@ -1,7 +1,7 @@
 """Mesh files as they are: vertices and facets, nothing joined, left out or put in order.
 
-STL, OBJ, PLY and OFF are read here, strictly: a count, an id or a number that is wrong is told with its line. COLLADA
-and glTF are checked here, and read by pycollada and trimesh.
+STL, OBJ, PLY, OFF and 3MF are read here, strictly: a count, an id or a number that is wrong is told with its line.
+COLLADA and glTF are checked here, and read by pycollada and trimesh. What a file holds must be what its name says.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.errors import InvalidShape, MissingExtra, SceneError, cut
-from collide.scenes.loaders import dae, gltf, obj, off, ply, stl
+from collide.scenes.loaders import dae, gltf, obj, off, ply, stl, threemf
+from collide.scenes.loaders.content_formats import refuse_another_format
 from collide.scenes.loaders.files import MAX_PLACED, read_mesh_bytes
 from collide.scenes.loaders.polygons import Part, Read
 from collide.shapes.mesh import Mesh
@@ -27,8 +28,9 @@ _READERS: dict[str, Callable[[bytes, Path], Read]] = {
     ".obj": obj.read,
     ".ply": ply.read,
     ".off": off.read,
+    ".3mf": threemf.read,
 }
-SUFFIXES = (".stl", ".obj", ".ply", ".dae", ".glb", ".gltf", ".off")
+SUFFIXES = (".stl", ".obj", ".ply", ".dae", ".glb", ".gltf", ".off", ".3mf")
 
 
 class MeshBytes(NamedTuple):
@@ -51,6 +53,7 @@ def open_mesh(path: Path) -> MeshBytes:
     if inner not in SUFFIXES:
         raise SceneError(f"unknown mesh format {cut(inner)!r}; known are {', '.join(SUFFIXES)}", path=path)
     suffix, content = read_mesh_bytes(path)
+    refuse_another_format(content, suffix, path)
     return MeshBytes(path, suffix, content, gltf.source(content, suffix, path) if suffix in (".glb", ".gltf") else None)
 
 
