@@ -21,6 +21,7 @@ from collide.cli import fuzz as cli_fuzz
 from collide.cli import locality_command as cli_locality
 from collide.cli import numbers as cli_numbers
 from collide.cli import pages as cli_pages
+from collide.cli import solid_commands as cli_solids
 from collide.cli import spheres_command as cli_spheres
 from collide.cli import srdf as cli_srdf
 from collide.cli import sweep_command as cli_sweep
@@ -55,11 +56,15 @@ def parse(argv: list[str]) -> argparse.Namespace:
     return parser().parse_args(_with_negative_states(argv))
 
 
+#: Options whose value may begin with a minus.
+_WITH_NUMBERS = ("--state", "--pose", "--box", "--rpy")
+
+
 def _with_negative_states(argv: list[str]) -> list[str]:
     """``--state -0.5,1`` as ``--state=-0.5,1``: argparse takes a leading minus for an option."""
     joined: list[str] = []
     for word in argv:
-        if joined and joined[-1] == "--state" and re.match(r"-[\d.]", word):
+        if joined and joined[-1] in _WITH_NUMBERS and re.match(r"-[\d.]", word):
             joined[-1] += f"={word}"
         else:
             joined.append(word)
@@ -73,6 +78,7 @@ _TOP = """examples:
   collide report part_a.stl part_b.obj    do two meshes meet?
   collide check scene.yaml && echo free   for scripts
   collide view panda_workbench            look at it, in a browser
+  collide solid a.stl difference b.stl --out c.3mf
   collide doctor                          is this installation sound?
 
 exit status: 0 done or free, 1 collision found, 2 error (one line on stderr)"""
@@ -85,7 +91,7 @@ _REPORT = """examples:
   collide report planning_scene.yaml --robot panda.urdf --state start,goal
   collide report robot.urdf cell.yaml --trajectory plan.csv --clearance 2cm
   collide report part_a.stl part_b.obj --scale mm --meshes pieces
-  collide report robot.urdf --repair              solids of meshes with small holes
+  collide report robot.urdf --repair              solids of broken meshes
   collide report scene.yaml --json - | jq '.colliding[] | [.a, .b, .depth]'
   collide report panda_workbench --html page.html       to look at, in a browser
 
@@ -182,6 +188,7 @@ def parser() -> argparse.ArgumentParser:
     cli_sweep.add_arguments(sweep, _scene_arguments)
     export = _add(commands, "export", "a robot in its scene, for programs in C", cli_export.EPILOG)
     cli_export.add_arguments(export, _scene_arguments, _length)
+    _add_solid_commands(commands)
     config = _add(commands, "config", "how programs in C and C++ find the library", cli_config.EPILOG)
     cli_config.add_arguments(config)
     _add(commands, "doctor", "is this installation sound?", _DOCTOR)
@@ -190,6 +197,18 @@ def parser() -> argparse.ArgumentParser:
 
 def _add(commands, name: str, summary: str, epilog: str) -> argparse.ArgumentParser:
     return commands.add_parser(name, help=summary, description=summary[0].upper() + summary[1:], epilog=epilog)
+
+
+def _add_solid_commands(commands) -> None:
+    for name, summary, epilog, add_arguments in (
+        ("solid", "union, intersection or difference of solids", cli_solids.SOLID, cli_solids.add_solid_arguments),
+        ("cells", "a solid, or free space, as convex cells", cli_solids.CELLS, cli_solids.add_cells_arguments),
+        ("obstacle", "where a translating body meets another", cli_solids.OBSTACLE, cli_solids.add_obstacle_arguments),
+    ):
+        parser = _add(commands, name, summary, epilog)
+        add_arguments(parser, _mesh_arguments, _length)
+        _output_arguments(parser)
+        cli_pages.add_argument(parser)
 
 
 def _add_stress(commands) -> None:
@@ -286,10 +305,15 @@ def _scene_arguments(parser: argparse.ArgumentParser, at_least: int = 1) -> None
     )
     group.add_argument("--robot", metavar="FILE", help="the robot of a planning scene: URDF, MJCF or SDFormat")
     group.add_argument("--srdf", metavar="FILE", help="disabled pairs and named states (default: beside the robot)")
+    _mesh_arguments(group)
+
+
+def _mesh_arguments(group) -> None:
+    """How mesh files are found and taken.   group : a parser, or a group of one."""
     kind = group.add_mutually_exclusive_group()
-    kind.add_argument("--meshes", choices=("mesh", "repaired", "hull", "pieces"),
-                      help="how meshes enter: as they are (default), repaired, as convex hulls, or as unions of convex "
-                           "pieces")
+    kind.add_argument("--meshes", choices=("mesh", "repaired", "hull", "pieces"), metavar="HOW",
+                      help="how meshes enter: mesh (as they are, the default), repaired, hull (convex hulls) or pieces "
+                           "(unions of convex pieces)")
     kind.add_argument("--repair", action="store_const", const="repaired", dest="meshes",
                       help="--meshes repaired: make solids of broken meshes (holes, facets turned over, repeats), and "
                            "say what was done")

@@ -9,6 +9,8 @@ from collide.base.whole_file import whole_file, write_whole
 from collide.errors import InvalidArgument
 from collide.reports.number_format import count
 
+#: What meshes are written as (`collide.shapes.mesh_formats`).
+MESH_SUFFIXES = (".stl", ".ply", ".obj", ".off", ".3mf", ".glb")
 #: What is larger is read as a scene by no loader (`scenes/loaders/documents.py`), and need not be looked into.
 _LARGEST_SCENE = 256 * 2**20
 

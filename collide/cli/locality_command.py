@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from collide.cli.files import write_json
+from collide.cli.files import MESH_SUFFIXES, write_json
 from collide.errors import InvalidArgument
 
 EPILOG = """examples:
@@ -33,8 +33,6 @@ count as neighbours.
 
 exit status: 0 measured, 2 error"""
 
-_SUFFIXES = (".stl", ".ply", ".obj", ".off", ".3mf", ".glb")
-
 
 def add_arguments(parser) -> None:
     """Those of its own."""
@@ -62,8 +60,8 @@ def run(args, progress) -> int:
 
     if args.plot:
         locality_report.check_plot(args.plot)
-    if args.localised and not args.localised.lower().endswith(_SUFFIXES):
-        raise InvalidArgument(f"--localised: {args.localised!r} must end in {', '.join(_SUFFIXES)}")
+    if args.localised and not args.localised.lower().endswith(MESH_SUFFIXES):
+        raise InvalidArgument(f"--localised: {args.localised!r} must end in {', '.join(MESH_SUFFIXES)}")
     meshes = []
     for place in args.meshes:
         with progress(f"reading {place}"):

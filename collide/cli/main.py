@@ -26,6 +26,7 @@ from collide.cli import fuzz as cli_fuzz
 from collide.cli import locality_command as cli_locality
 from collide.cli import pages as cli_pages
 from collide.cli import scenes as cli_scenes
+from collide.cli import solid_commands as cli_solids
 from collide.cli import spheres_command as cli_spheres
 from collide.cli import srdf as cli_srdf
 from collide.cli import sweep_command as cli_sweep
@@ -313,6 +314,9 @@ _COMMANDS: dict[str, Callable] = {
     "fuzz": lambda args: FREE if cli_fuzz.run(args, _progress(args.quiet)) else YES,
     "srdf": lambda args: FREE if cli_srdf.run(args, _progress(args.quiet)) else YES,
     "spheres": lambda args: FREE if cli_spheres.run(args, _progress(args.quiet)) else YES,
+    "solid": lambda args: cli_solids.run_solid(args, _progress(args.quiet)),
+    "cells": lambda args: cli_solids.run_cells(args, _progress(args.quiet)),
+    "obstacle": lambda args: cli_solids.run_obstacle(args, _progress(args.quiet)),
     "sweep": lambda args: FREE if cli_sweep.run(args, _progress(args.quiet)) else YES,
     "view": lambda args: cli_view.run(args, _progress(args.quiet), _STARTED, _say),
 }

@@ -230,7 +230,10 @@ def test_no_command_shows_help(capsys):
     assert "examples:" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("command", ["report", "check", "compare", "locality", "scenes", "doctor", "config", "export"])
+@pytest.mark.parametrize(
+    "command",
+    ["report", "check", "compare", "locality", "scenes", "doctor", "config", "export", "solid", "cells", "obstacle"],
+)
 def test_every_command_teaches_itself(capsys, monkeypatch, command):
     monkeypatch.setenv("COLUMNS", "80")
     assert cli.main([command, "--help"]) == 0
