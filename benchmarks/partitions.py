@@ -39,7 +39,7 @@ def partition_of(mesh: collide.Mesh, **arguments) -> dict:
         "facets": n, "cells": s.cells, "cells_a_facet": s.cells / n, "over_nlogn": s.cells / (n * np.log2(n)),
         "over_n2": s.cells / n**2, "depth": s.depth, "mean_depth": s.mean_depth, "over_log_n": s.depth / np.log2(n),
         "first_cells": s.first_cells, "most_in_one": s.max_facets, "mean_in_one": s.pieces / s.first_cells,
-        "integers": s.integers, "fractions": s.fractions, "s": seconds, "kappa": s.kappa,
+        "integers": s.integers, "s": seconds, "kappa": s.kappa,
     }
 
 

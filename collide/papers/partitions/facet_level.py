@@ -3,7 +3,7 @@
 M. S. Paterson, F. F. Yao, "Efficient binary space partitions for hidden-surface removal and solid modeling" (1990).
 Facets are taken in random order, and a facet from wall to wall of its cell is taken at once: its plane cuts only
 facets that cross the facet (a free cut). k facets make O(k²) cells in expectation. At the end no facet
-passes through a cell.
+passes through a cell. Each pivot is the witness of its cut (`leaf_labels.py`).
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from collide.papers.partitions.cut_polygons import Edges, Polygons, cut_polygons, edge_rows, joined
+from collide.papers.partitions.leaf_labels import Witnesses, links_of
 from collide.papers.partitions.partition_tree import PartitionTree
 from collide.papers.partitions.vertices import Vertices
 
@@ -31,22 +32,25 @@ def cut_along_facets(
     while begin < len(polygons.cell):
         end = int(ends[np.searchsorted(ends, min(begin + _AT_ONCE, len(polygons.cell)))])
         with progress(f"cutting space along facets, {100 * begin // len(polygons.cell)} %: {tree.plane.n + 1:,} cells"):
-            active = polygons[begin:end]
+            active, n_held = polygons[begin:end], len(tree.held)
+            pivots: list[Polygons] = []
             while len(active.cell):
-                active = _round(tree, vertices, edges, active, rng)
+                active = _round(tree, vertices, edges, active, rng, pivots)
                 tree.other_bytes = bytes_before + (vertices.xyz.n - n_vertices) * 56 + (edges.vertex.n - n_edges) * 16
+            tree.links.append(links_of(tree, vertices, _witnesses(edges, joined(*pivots)), tree.held[n_held:]))
         vertices.cut_back(n_vertices)
         edges.cut_back(n_edges)
         tree.other_bytes = bytes_before
         begin = end
 
 
-def _round(tree, vertices, edges, polygons: Polygons, rng) -> Polygons:
-    """Cut each cell once; returns what is left of the polygons."""
+def _round(tree, vertices, edges, polygons: Polygons, rng, pivots: list[Polygons]) -> Polygons:
+    """Cut each cell once; returns what is left of the polygons. `pivots` get the polygons that cut, `cell` the cut."""
     first, cell = _groups(polygons.cell)
     pivot = _pivots(vertices, edges, polygons, rng, first, cell)
     planes = polygons.plane[pivot]
-    cuts = tree.cut(polygons.cell[pivot], planes, _seats(vertices, edges, polygons[pivot]))
+    cuts = tree.cut(polygons.cell[pivot], planes)
+    pivots.append(replace(polygons[pivot], cell=cuts))
     others = np.ones(len(cell), dtype=bool)
     others[pivot] = False
     tree.hold(cuts, planes)
@@ -82,11 +86,7 @@ def _pivots(vertices, edges, polygons, rng, first, cell) -> np.ndarray:
     return np.lexsort((rng.random(len(cell)) + bounded, cell))[first]
 
 
-def _seats(vertices, edges, polygons: Polygons) -> np.ndarray:
-    """(k, 4) the middles of polygons' vertices, and about how wide they are."""
-    rows, _ = edge_rows(polygons)
-    xyz = vertices.xyz.rows[edges.vertex.rows[rows]]
-    first = np.cumsum(polygons.count) - polygons.count
-    low, high = np.minimum.reduceat(xyz, first), np.maximum.reduceat(xyz, first)
-    middle = np.add.reduceat(xyz - np.repeat(low, polygons.count, axis=0), first) / polygons.count[:, None] + low
-    return np.concatenate((middle, (high - low).max(axis=1)[:, None]), axis=1)
+def _witnesses(edges: Edges, pivots: Polygons) -> Witnesses:
+    """Pieces of facets as witnesses of the cuts in their planes."""
+    rows, _ = edge_rows(pivots)
+    return Witnesses(pivots.cell, np.cumsum(pivots.count) - pivots.count, pivots.count, edges.vertex.rows[rows])

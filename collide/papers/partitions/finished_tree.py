@@ -29,7 +29,8 @@ class FinishedTree:
     """A binary space partition whose leaves are numbered from left to right.
 
     plane : (cuts,) the plane of each cut.   below : (2 cuts + 1,) what stands at a place: a cut c ≥ 0, or ~leaf.
-    first, last : (cuts,) the leaves under a cut are first … last.   place : (leaves,), where each leaf stands.
+    first, last_below, last : (cuts,) the leaves below a cut are first … last_below, those above end with last.
+    levels : the cuts at every depth, from the root's.   place : (leaves,), where each leaf stands.
     depth : the most cuts above a leaf.   mean_depth : over leaves.
     held_starts, held : facets in the plane and cell of cut c are held[held_starts[c] : held_starts[c + 1]].
     """
@@ -59,6 +60,7 @@ class FinishedTree:
         self.place = np.empty(len(places), dtype=np.int64)
         self.place[starts[places]] = places
         self.first, self.last = starts[at], starts[at] + sizes[at] - 1
+        self.last_below, self.levels = starts[2 * np.arange(n) + 2] - 1, levels[:-1]
         self.depth, self.mean_depth = int(depths[places].max()), float(depths[places].mean())
         held = [np.concatenate(columns) for columns in zip(*grown.held)] or [np.zeros(0, dtype=np.int64)] * 2
         order = np.argsort(held[0], kind="stable")

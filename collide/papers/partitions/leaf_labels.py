@@ -1,164 +1,149 @@
-"""Labels of leaves inside the solid: facets wind around all points of a leaf alike, so a single point decides."""
+"""Labels of leaves inside the solid: winding numbers, carried from leaf to leaf across cuts; exact, and without points.
+
+Every cut has a witness, a convex polygon in the cut's plane and within the cut's cell, with corners p0, p1, p2, … Take
+the point p0 + ε (p1 − p0) + ε² (p2 − p0) + … for an ε > 0 as small as need be: all weights of the corners are above 0,
+so the point is within the polygon, and on the side of a plane where the first corner off the plane lies. The point is
+sent down both sides of its cut, by signs of corners alone, to two leaves that touch around the point. Their winding
+numbers differ by the facets in the cut's plane that cover the point. A cut links a leaf below with a leaf above, so all
+cuts link all leaves to a tree, and around a leaf beyond the mesh facets wind 0 times.
+"""
 
 from __future__ import annotations
 
-from fractions import Fraction
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
-from collide.errors import UnsupportedQuery
-from collide.lowering.facet_bodies import body_of
-from collide.narrowphase.facets.facet_queries import points_in_solid
-from collide.narrowphase.facets.winding_numbers import INSIDE, OUTSIDE, UNDECIDED
-from collide.papers.partitions.convex_cells import CellBlock, cell_blocks
-from collide.papers.partitions.cut_polygons import edge_rows
 from collide.papers.partitions.finished_tree import FinishedTree
-from collide.papers.partitions.planes import Planes, signs_of
-from collide.shapes.mesh import Mesh
-from collide.surface_queries.contains import winds_around
-
-#: Distances of tried points from a cut, in widths of the piece of facet in the cut.
-_STEPS = tuple(2.0**-k for k in (2, 5, 8, 11, 14, 18, 22, 27, 32, 40))
+from collide.papers.partitions.orthogonal_level import OrthogonalLevel
+from collide.papers.partitions.partition_tree import Links, PartitionTree
+from collide.papers.partitions.vertices import Vertices
 
 
-def leaves_inside(tree: FinishedTree, mesh: Mesh, seats: np.ndarray, middles: np.ndarray) -> tuple[np.ndarray, int]:
-    """((leaves,) bool, how many took fractions). The facets wind around all points of a leaf alike.
+class Witnesses(NamedTuple):
+    """Convex polygons, each within its cut.   cut : (k,) ascending.   begin, n_corners : (k,), in `vertex`."""
 
-    seats : (cuts, 4), of `PartitionTree`.   middles : (places of the first level, 3), a point of each.
+    cut: np.ndarray
+    begin: np.ndarray
+    n_corners: np.ndarray
+    vertex: np.ndarray
+
+    def signs(
+        self, rows: np.ndarray, planes: np.ndarray, sign_of: Callable[[np.ndarray, np.ndarray], np.ndarray]
+    ) -> np.ndarray:
+        """(k,) int8, the sides of planes with the points of witnesses: each the first nonzero sign of the corners.
+
+        sign_of : (vertices (m,), planes (m,)) → signs (m,).
+        """
+        sign, waiting, k = np.zeros(len(rows), dtype=np.int8), np.arange(len(rows)), 0
+        while len(waiting):
+            if (self.n_corners[rows[waiting]] <= k).any():
+                raise AssertionError("a plane below a cut is the cut's own: please report it")
+            sign[waiting] = sign_of(self.vertex[self.begin[rows[waiting]] + k], planes[waiting])
+            waiting, k = waiting[sign[waiting] == 0], k + 1
+        return sign
+
+
+def witnesses_of_axes(level: OrthogonalLevel) -> tuple[Vertices, Witnesses]:
+    """Of the cuts of the first level: the rectangles in which the cuts meet the cubes of their cells."""
+    tree, planes = level.tree, level.vertices.planes.with_own_axis_planes()
+    places = np.flatnonzero(tree.below.rows >= 0)
+    places = places[tree.plane.rows[tree.below.rows[places]] >= 4 * planes.n]
+    places = places[np.argsort(tree.below.rows[places])]
+    cut = tree.below.rows[places]
+    plane = tree.plane.rows[cut]
+    k, rows = plane - 4 * planes.n, np.arange(len(cut))
+    axis, ends = planes.axis.rows[k], np.stack((level.low.rows[places], level.high.rows[places]), axis=1)
+    ends[rows, :, axis] = planes.value.rows[k, None]
+    names = planes.add_axis_planes(np.tile(np.arange(3), 2 * len(cut)), ends.ravel()).reshape(-1, 2, 3)
+    names[rows, :, axis] = plane[:, None]
+    vertices, xyz = Vertices(planes), np.arange(3)
+    loop = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
+    which = np.zeros((len(cut), 4, 3), dtype=np.int64)
+    for side in range(2):
+        which[rows, :, (axis + 1 + side) % 3] = loop[:, side]
+    corner = (rows[:, None, None], which, xyz)
+    made = vertices.add(ends[corner].reshape(-1, 3), np.zeros(4 * len(cut)), names[corner].reshape(-1, 3))
+    return vertices, Witnesses(cut, 4 * rows, np.full(len(cut), 4), made)
+
+
+def links_of(tree: PartitionTree, vertices: Vertices, witnesses: Witnesses, held) -> Links:
+    """The leaves next to witnesses, and the steps between.
+
+    held : [(cuts, facets)], of `PartitionTree.held`, all of the witnesses' cuts at least.
     """
-    inside = np.zeros(tree.n_leaves, dtype=bool)
-    remaining = np.arange(tree.n_leaves)
-    for step in _STEPS:
-        points = _candidates(tree, seats, middles, remaining, step)
-        good = _strictly_in(tree, points, remaining)
-        inside[remaining[good]] = _winds(mesh, points[good])
-        remaining = remaining[~good]
-        if len(remaining) == 0:
-            return inside, 0
-    n_fractions = 0
-    low, high = tree.planes.vertices.min(axis=0), tree.planes.vertices.max(axis=0)  # all inside is within
-    facet_boxes = _FacetBoxes(tree.planes)
-    for block in cell_blocks(tree, remaining, low, high):
-        n_fractions += _label_block(tree, mesh, block, inside, facet_boxes)
-    return inside, n_fractions
+    cut = witnesses.cut
+    place = _sent_down(tree, vertices, witnesses, np.concatenate((2 * cut + 1, 2 * cut + 2)))
+    return Links(cut, place[: len(cut)], place[len(cut) :], _steps(tree, vertices, witnesses, held))
 
 
-def _label_block(tree: FinishedTree, mesh: Mesh, block: CellBlock, inside: np.ndarray, facets: _FacetBoxes) -> int:
-    """Thin leaves: the mean of their corners, rounded; in fractions where rounding leaves the leaf."""
-    rows, owner = edge_rows(block.faces)
-    used, vertex = np.unique(block.edges.vertex.rows[rows], return_inverse=True)
-    cell = block.faces.cell[owner]
-    pairs = np.unique(np.stack((cell, np.ravel(vertex)), axis=1), axis=0)
-    xyz, _ = block.vertices.rounded(used)
-    count = np.bincount(pairs[:, 0], minlength=len(block.leaf))
-    sums = np.stack([np.bincount(pairs[:, 0], xyz[pairs[:, 1], k], len(count)) for k in range(3)], axis=1)
-    points = sums / count[:, None]
-    good = _strictly_in(tree, points, block.leaf)
-    inside[block.leaf[good]] = _winds(mesh, points[good])
-    remaining = np.flatnonzero(~good)
-    starts = np.cumsum(count) - count
-    for k in remaining.tolist():
-        corners = used[pairs[starts[k] : starts[k] + count[k], 1]]
-        inside[block.leaf[k]] = _winds_around_cell(block, k, corners, facets)
-    return len(remaining)
+def _sent_down(tree: PartitionTree, vertices: Vertices, witnesses: Witnesses, place: np.ndarray) -> np.ndarray:
+    """The places of leaves that points of witnesses come to from places (2 k,), the witnesses taken twice."""
+    below, plane = tree.below.rows, tree.plane.rows
+    active = np.arange(len(place))
+    while len(active := active[below[place[active]] >= 0]):
+        cut = below[place[active]]
+        sign = witnesses.signs(active % len(witnesses.cut), plane[cut], lambda *pairs: vertices.sides(*pairs).sign)
+        place[active] = 2 * cut + 1 + (sign > 0)
+    return place
 
 
-def _strictly_in(tree: FinishedTree, points: np.ndarray, leaves: np.ndarray) -> np.ndarray:
-    """Which points lie in the open cells of their leaves."""
-    touched = tree.touches(points)
-    leaf = np.full(len(leaves), -1)
-    leaf[touched.point] = touched.leaf
-    return (np.bincount(touched.point, minlength=len(leaves)) == 1) & (leaf == leaves)
+def _steps(tree: PartitionTree, vertices: Vertices, witnesses: Witnesses, held) -> np.ndarray:
+    """(k,) winding numbers below the cuts less those above, next to the witnesses."""
+    steps = np.zeros(len(witnesses.cut), dtype=np.int64)
+    cuts, facets = (np.concatenate(columns) for columns in zip((steps[:0], steps[:0]), *held))
+    row = np.minimum(np.searchsorted(witnesses.cut, cuts), max(len(steps) - 1, 0))
+    mine = witnesses.cut[row] == cuts if len(steps) else np.zeros(len(cuts), dtype=bool)
+    row, facets, plane = row[mine], facets[mine], tree.plane.rows[cuts[mine]]
+    covers = facets == plane  # a witness is a piece of the facet whose plane cuts
+    rows = np.flatnonzero(~covers)
+    covers[rows] = _covers(vertices, witnesses, row[rows], facets[rows])
+    row, against = row[covers], vertices.planes.run_against(facets[covers], plane[covers])
+    np.add.at(steps, row, np.where(against, -1, 1))
+    return steps
 
 
-def _candidates(tree: FinishedTree, seats, middles, leaves: np.ndarray, step: float) -> np.ndarray:
-    """A point of each leaf, if rounding and other cuts allow."""
-    place = tree.place[leaves]
-    cut = (place - 1) // 2
-    points = np.empty((len(leaves), 3))
-    boxes = (place == 0) | np.isnan(seats[cut, 3] if len(seats) else np.full(len(cut), np.nan))
-    points[boxes] = middles[place[boxes]]
-    rows = np.flatnonzero(~boxes)
-    normal = tree.planes.normal[tree.plane[cut[rows]]]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        normal = normal / np.abs(normal).max(axis=1, keepdims=True)
-        normal = np.nan_to_num(normal / np.sqrt((normal * normal).sum(axis=1, keepdims=True)))
-    off = step * seats[cut[rows], 3] * np.where(place[rows] % 2 == 1, -1.0, 1.0)
-    points[rows] = seats[cut[rows], :3] + off[:, None] * normal
-    return points
+def _covers(vertices: Vertices, witnesses: Witnesses, rows: np.ndarray, facets: np.ndarray) -> np.ndarray:
+    """(k,) bool: facets cover the points of witnesses in their planes."""
+    planes = vertices.planes
+    first = witnesses.vertex[witnesses.begin[rows]]
+    corners = planes.vertices[planes.faces[facets]]
+    xyz, slack = vertices.xyz.rows[first], 2.0 * vertices.error.rows[first, None]
+    covers = ((xyz + slack >= corners.min(axis=1)) & (xyz - slack <= corners.max(axis=1))).all(axis=1)
+    for edge in range(3):
+        near = np.flatnonzero(covers)
+        line = planes.n + 3 * facets[near] + edge
+        inner = vertices.exact_signs(planes.faces[facets[near], (edge + 2) % 3], line)
+        covers[near] = witnesses.signs(rows[near], line, vertices.exact_signs) == inner
+    return covers
 
 
-def _winds(mesh: Mesh, points: np.ndarray) -> np.ndarray:
-    """Whether facets wind around points that lie on no facet with an area."""
-    where = points_in_solid(body_of(mesh).tree, np.eye(4), points, np.eye(4)) if len(points) else np.zeros(0, dtype=int)
-    for k in np.flatnonzero(where == UNDECIDED).tolist():
-        where[k] = INSIDE if winds_around(mesh, np.eye(4), points[k]) else OUTSIDE
-    return where != OUTSIDE
+def winding_numbers(tree: FinishedTree, links: list[Links]) -> np.ndarray:
+    """(leaves,) int64, how often facets wind around each leaf.   links : of all cuts, each once."""
+    winding = np.zeros(tree.n_leaves, dtype=np.int64)
+    if not links:
+        return winding
+    cut, below, above, step = (np.concatenate(columns) for columns in zip(*links))
+    order = np.argsort(cut)
+    below, above, step = ~tree.below[below[order]], ~tree.below[above[order]], step[order]
+    for cuts in reversed(tree.levels):  # all leaves above a cut are raised to fit the leaves below
+        raised = np.zeros(tree.n_leaves + 1, dtype=np.int64)
+        by = winding[below[cuts]] - step[cuts] - winding[above[cuts]]
+        raised[tree.last_below[cuts] + 1] = by
+        np.add.at(raised, tree.last[cuts] + 1, -by)
+        winding += np.cumsum(raised)[:-1]
+    return winding - _beyond(tree, winding)
 
 
-class _FacetBoxes:
-    """The planes of facets, and the boxes that facets lie in."""
-
-    def __init__(self, planes: Planes):
-        self.planes = planes
-        corners = planes.vertices[planes.faces]
-        self.low, self.high = corners.min(axis=1), corners.max(axis=1)
-
-    def ahead(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-        """Facets in the way of a ray along +x from a point between low and high, by their boxes."""
-        near = (self.low[:, 1:] <= high[1:]) & (self.high[:, 1:] >= low[1:])
-        return np.flatnonzero(near.all(axis=1) & (self.high[:, 0] >= low[0]))
-
-
-def _winds_around_cell(block: CellBlock, k: int, corners: np.ndarray, facets: _FacetBoxes) -> bool:
-    """The same for a cell too thin for doubles: a finer point of it, and a ray along x, in integers."""
-    exact = block.vertices.exact(corners)
-    near, error = block.vertices.rounded(corners)
-    rows = facets.ahead(near.min(axis=0) - error, near.max(axis=0) + error)
-    faces = block.faces[np.searchsorted(block.faces.cell, k) : np.searchsorted(block.faces.cell, k, "right")]
-    walls = block.vertices.planes.coefficients(faces.plane)
-    for attempt in range(1, 50):
-        weights = [1 + attempt * i * i % 97 for i in range(len(corners))]
-        winding = _winding_number(facets.planes, rows, _point_between(exact, weights, walls, faces.side))
-        if winding is not None:
-            return winding > 0
-    raise UnsupportedQuery("SpacePartition: every ray tried from a cell passes an edge; please report it")
-
-
-def _point_between(corners: np.ndarray, weights: list[int], walls: np.ndarray, side: np.ndarray):
-    """(x, y, z, w) Python integers, strictly within walls (f, 4): a mean of the corners to as few bits as will do."""
-    total = sum(weights)
-    weighed = [(weight, p[3], p[:3]) for weight, p in zip(weights, corners.tolist())]
-    mean = [sum(weight * Fraction(p[k], w) for weight, w, p in weighed) / total for k in range(3)]
-    bits = 64
-    while True:
-        point = np.array([[*(round(x * (1 << bits)) for x in mean), 1 << bits]], dtype=object)
-        if np.array_equal(signs_of(point, walls), side):
-            return point[0]
-        bits *= 2
-
-
-def _winding_number(planes: Planes, rows: np.ndarray, point) -> int | None:
-    """The winding number of facets around a rational point, by the hits of a ray along +x with the rows; ``None`` at an
-    edge.
-    """
-    x, y, z, w = point
-    coefficients = planes.coefficients(rows)
-    above = signs_of(np.array([[x, y, z, w]], dtype=object), coefficients)
-    winding = 0
-    for row, plane, side in zip(rows.tolist(), coefficients, above):
-        turns = []
-        corners = planes.grid_vertices[planes.faces[row]]
-        for a, b in ((0, 1), (1, 2), (2, 0)):
-            (ya, za), (yb, zb) = (corners[k, 1:] * w - np.array([y, z], dtype=object) for k in (a, b))
-            turns.append(ya * zb - za * yb)
-        if plane[0] == 0:  # seen along the ray it is a segment
-            if all(t == 0 for t in turns):
-                return None
-            continue
-        if any(t == 0 for t in turns) and not (min(turns) < 0 < max(turns)):
-            return None
-        if min(turns) > 0 or max(turns) < 0:
-            ahead = side * (1 if plane[0] > 0 else -1) < 0  # the plane lies at larger x than the point
-            winding += (1 if plane[0] > 0 else -1) if ahead else 0
-    return winding
+def _beyond(tree: FinishedTree, winding: np.ndarray) -> int:
+    """The number of all leaves that hold corners of a box around the mesh."""
+    corners = tree.planes.vertices[tree.planes.faces].reshape(-1, 3)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    ends = np.stack((np.minimum(low - (high - low), np.nextafter(low, -np.inf)),
+                     np.maximum(high + (high - low), np.nextafter(high, np.inf))))
+    far = tree.touches(ends[(np.arange(8)[:, None] >> np.arange(3)) & 1, np.arange(3)])
+    numbers = np.unique(winding[far.leaf])
+    if len(numbers) != 1:
+        raise AssertionError("facets wind around leaves beyond the mesh: please report it")
+    return int(numbers[0])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from collide.errors import UnsupportedQuery
@@ -13,25 +15,37 @@ EMPTY = np.iinfo(np.int64).min
 _CUT_BYTES, _HELD_BYTES = 88, 16
 
 
+class Links(NamedTuple):
+    """Leaves that touch across cuts, (k,) each.
+
+    cut : numbers of the cuts.   below, above : places of a leaf on each side, with a common piece of a face.
+    step : how often facets wind around the leaf below, less how often around the leaf above.
+    """
+
+    cut: np.ndarray
+    below: np.ndarray
+    above: np.ndarray
+    step: np.ndarray
+
+
 class PartitionTree:
     """Places are numbered: 0 is all of space, 2 c + 1 is the side below cut c, 2 c + 2 the side above.
 
     plane : (cuts,), the plane of each cut.   below : (places,), the cut at a place, or EMPTY for a leaf.
-    seat : (cuts, 4) a point in the cut and inside its cell, to rounding, and the approximate size of its source.
     held : [(cuts (k,), facets (k,))], facets that lie in the plane of a cut and in its cell.
+    links : a leaf on each side of every cut, block by block.
     """
 
     def __init__(self, memory: int):
         self.memory, self.other_bytes, self.prediction = memory, 0, ""
         self.plane, self.below = GrowingRows.empty(np.int64), GrowingRows.empty(np.int64)
-        self.seat = GrowingRows.empty(float, 4)
         self.held: list[tuple[np.ndarray, np.ndarray]] = []
+        self.links: list[Links] = []
         self.below.add(np.array([EMPTY]))
 
-    def cut(self, places: np.ndarray, planes: np.ndarray, seats: np.ndarray | None = None) -> np.ndarray:
+    def cut(self, places: np.ndarray, planes: np.ndarray) -> np.ndarray:
         """Cut the cells at places by a plane each; returns the numbers of the cuts."""
         made = self.plane.add(planes)
-        self.seat.add(np.full((len(planes), 4), np.nan) if seats is None else seats)
         self.below.rows[places] = made
         self.below.add(np.full(2 * len(planes), EMPTY))
         self.check_memory()

@@ -117,6 +117,15 @@ class Planes:
             out[rows] = self._of_edges(cut[rows] - self.n)
         return out
 
+    def run_against(self, facets: np.ndarray, cut: np.ndarray) -> np.ndarray:
+        """(k,) bool: facets, coplanar with a plane each, with the opposite normal; exact."""
+        against = np.zeros(len(facets), dtype=bool)
+        rows = np.flatnonzero(facets != cut)
+        if len(rows):
+            a, b = self.coefficients(facets[rows]), self.coefficients(cut[rows])
+            against[rows] = ((a[:, :3] * b[:, :3]).sum(axis=1) < 0).astype(bool)
+        return against
+
     @cached_property
     def grid_vertices(self) -> np.ndarray:
         """(v, 3) Python integers: the mesh's vertices in units of 2^−grid."""

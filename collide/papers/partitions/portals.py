@@ -10,7 +10,6 @@ import numpy as np
 from collide.papers.partitions.convex_cells import CellBlock
 from collide.papers.partitions.cut_polygons import Polygons, cut_polygons, edge_rows, joined
 from collide.papers.partitions.finished_tree import FinishedTree
-from collide.papers.partitions.planes import Planes
 
 
 class Portals(NamedTuple):
@@ -50,7 +49,7 @@ def portals_of_block(tree: FinishedTree, block: CellBlock, whole: np.ndarray) ->
         made = cut_polygons(vertices, edges, faces, tree.plane[cut])
         above = made.above.copy()
         flat = np.flatnonzero(~(made.above | made.below))
-        above[flat] = _runs_against(planes, faces.plane[flat], tree.plane[cut[flat]])
+        above[flat] = planes.run_against(faces.plane[flat], tree.plane[cut[flat]])
         on_one_side = np.flatnonzero(~(made.above & made.below))
         both = cut[made.both]
         place = np.concatenate((2 * cut[on_one_side] + 1 + above[on_one_side], 2 * both + 1, 2 * both + 2))
@@ -58,16 +57,6 @@ def portals_of_block(tree: FinishedTree, block: CellBlock, whole: np.ndarray) ->
     if not done:
         return (*(np.zeros(0, dtype=np.int64),) * 2, np.zeros((0, 3)), np.zeros(0))
     return tuple(np.concatenate(columns) for columns in zip(*done))
-
-
-def _runs_against(planes: Planes, plane: np.ndarray, cut_plane: np.ndarray) -> np.ndarray:
-    """(k,) bool: planes, coplanar with a cut each, with the opposite normal; exact."""
-    against = np.zeros(len(plane), dtype=bool)
-    rows = np.flatnonzero(plane != cut_plane)
-    if len(rows):
-        a, b = planes.coefficients(plane[rows]), planes.coefficients(cut_plane[rows])
-        against[rows] = ((a[:, :3] * b[:, :3]).sum(axis=1) < 0).astype(bool)
-    return against
 
 
 def _measured(block: CellBlock, polygons: Polygons) -> tuple[np.ndarray, np.ndarray]:

@@ -20,7 +20,7 @@ from collide.papers.partitions.convex_cells import cell_blocks
 from collide.papers.partitions.cut_polygons import Edges
 from collide.papers.partitions.facet_level import cut_along_facets
 from collide.papers.partitions.finished_tree import FinishedTree
-from collide.papers.partitions.leaf_labels import leaves_inside
+from collide.papers.partitions.leaf_labels import links_of, winding_numbers, witnesses_of_axes
 from collide.papers.partitions.orthogonal_level import OrthogonalLevel
 from collide.papers.partitions.partition_tree import PartitionTree
 from collide.papers.partitions.planes import Planes
@@ -57,7 +57,7 @@ class PartitionSize(NamedTuple):
     first_cells, pieces : cells of the first level with facets, and pieces of facets in them.
     max_facets : in a cell of the first level.   kappa : the most corners of facets' boxes in a cell of the first level.
     depth, mean_depth : cuts above a leaf, at most and on average.
-    integers : signs decided in integers.   fractions : leaves labelled by a rational point.
+    integers : signs decided in integers.
     """
 
     facets: int
@@ -72,7 +72,6 @@ class PartitionSize(NamedTuple):
     depth: int
     mean_depth: float
     integers: int
-    fractions: int
 
 
 class SpacePartition:
@@ -86,6 +85,12 @@ class SpacePartition:
     seed : of the random order of cutting facets: the same seed, the same cells.
     memory : the most bytes of the growing partition.
     progress : called with a label, gives a context manager around long work.
+
+    Attributes
+    ----------
+    mesh : as given.   size : a `PartitionSize`.
+    winding : (leaves,) int64, how often facets wind around each leaf.
+    inside : (leaves,) bool, leaves of the solid: of winding number 1 or more.
 
     Raises
     ------
@@ -129,12 +134,14 @@ class SpacePartition:
         cut_along_facets(grown, vertices, edges, level.polygons, np.random.default_rng(seed), progress)
         self._tree = FinishedTree(grown, planes)
         with progress(f"telling which of {self._tree.n_leaves:,} cells are inside"):
-            middles = level.low.rows + 0.5 * (level.high.rows - level.low.rows)
-            self.inside, n_fractions = leaves_inside(self._tree, mesh, grown.seat.rows, middles)
+            beside, witnesses = witnesses_of_axes(level)
+            grown.links.append(links_of(grown, beside, witnesses, grown.held))
+            self.winding = winding_numbers(self._tree, grown.links)
+            self.inside = self.winding > 0
         self.size = PartitionSize(
             planes.n, len(mesh.faces) - planes.n, self._tree.n_leaves, int(self.inside.sum()), len(self._tree.plane),
             len(facets_in), int(facets_in.sum()), int(facets_in.max()), kappa, self._tree.depth, self._tree.mean_depth,
-            vertices.n_exact, n_fractions,
+            vertices.n_exact + beside.n_exact,
         )
 
     def locate(self, points) -> Located:

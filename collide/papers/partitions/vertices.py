@@ -57,7 +57,7 @@ class Vertices:
         if len(remaining):
             remaining = remaining[~self._on_by_name(vertex[remaining], cut[remaining])]
         if len(remaining):
-            sign[remaining] = self._exact_signs(vertex[remaining], cut[remaining])
+            sign[remaining] = self.exact_signs(vertex[remaining], cut[remaining])
         return Sides(sign, height, bound)
 
     def _on_by_name(self, vertex: np.ndarray, cut: np.ndarray) -> np.ndarray:
@@ -79,7 +79,8 @@ class Vertices:
             on[rows[of_edge]] |= shared
         return on
 
-    def _exact_signs(self, vertex: np.ndarray, cut: np.ndarray) -> np.ndarray:
+    def exact_signs(self, vertex: np.ndarray, cut: np.ndarray) -> np.ndarray:
+        """(k,) int8, where vertices lie of planes, those through edges of facets among them: in integers."""
         self.n_exact += len(vertex)
         pairs, back = np.unique(np.stack((vertex, cut), axis=1), axis=0, return_inverse=True)
         signs = signs_of(self.exact(pairs[:, 0]), self.planes.coefficients(pairs[:, 1]))

@@ -9,13 +9,15 @@ import numpy as np
 import pytest
 from mesh_shapes import block_ring, box, bumpy_sphere
 from naive import rng_of
+from partition_judge import Judge, corners_of, middle, winding
 from reproduction import reproducing
+from solid_families import joined
 
 import collide
 from collide.papers.partitions.cut_polygons import Edges, edge_rows
 from collide.papers.partitions.facet_level import cut_along_facets
 from collide.papers.partitions.finished_tree import FinishedTree, exact_points
-from collide.papers.partitions.leaf_labels import leaves_inside
+from collide.papers.partitions.leaf_labels import links_of, winding_numbers, witnesses_of_axes
 from collide.papers.partitions.orthogonal_level import OrthogonalLevel
 from collide.papers.partitions.partition_tree import EMPTY, PartitionTree
 from collide.papers.partitions.planes import Planes
@@ -45,6 +47,7 @@ class Grown:
         self.held_first = list(self.tree.held)
         self.areas = [self.area(k) for k in range(len(self.pieces.cell))]
         cut_along_facets(self.tree, self.vertices, self.edges, self.pieces, np.random.default_rng(seed), progress)
+        self.tree.links.append(links_of(self.tree, *witnesses_of_axes(self.level), self.tree.held))
         self.finished = FinishedTree(self.tree, self.planes)
 
     def corners(self, k: int) -> np.ndarray:
@@ -207,11 +210,39 @@ def test_leaves_inside_are_those_whose_points_are(name):
     rng = rng_of("leaf labels", name)
     for seed in range(2):
         grown = Grown(name, 8, seed=seed)
-        middles = grown.level.low.rows + 0.5 * (grown.level.high.rows - grown.level.low.rows)
-        inside, _ = leaves_inside(grown.finished, grown.mesh, grown.tree.seat.rows, middles)
+        inside = winding_numbers(grown.finished, grown.tree.links) > 0
         points = rng.uniform(-1.2, 1.2, (60, 3))
         touched = grown.finished.touches(points)
         single = np.bincount(touched.point, minlength=60) == 1
         truth = collide.contains(grown.mesh, np.eye(4), points)
         assert np.array_equal(inside[touched.leaf[single[touched.point]]], truth[single]) and truth[single].any()
         assert 0 < inside.sum() < len(inside)
+
+
+def judged_grate(layers: int, is_turned: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Bars in one plane, or in two planes across; a turned grate's tops are in one plane but for rounding."""
+    bars = [box((2.0 * k, -1, 0), (2 * k + 1.0, 7, 1)) for k in range(3)]
+    bars += [box((-1.0, 2 * k, layers - 1.0), (6, 2 * k + 1.0, float(layers))) for k in range(3)]
+    vertices, faces = joined(*bars)
+    q, _ = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))
+    return (vertices @ (q * np.linalg.det(q)).T if is_turned else vertices), faces
+
+
+@pytest.mark.parametrize("layers, is_turned", [(1, False), (1, True), (2, False), (2, True)])
+def test_winding_numbers_are_those_of_a_point_of_each_leaf(layers, is_turned):
+    """Bars that overlap or lie on one another, by the judge's rays in fractions: 0, 1 and 2 times around a leaf."""
+    vertices, faces = judged_grate(layers, is_turned)
+    limits = (vertices.min(axis=0) - 1.0, vertices.max(axis=0) + 1.0)
+    partition = collide.SpacePartition(collide.Mesh(vertices, faces), kappa=16)
+    cells, judge = partition.cells(limits), Judge(vertices, faces, limits)
+    rows = np.random.default_rng(0).permutation(len(cells))
+    thin = rows[cells.volumes[rows] < 1e-13]
+    assert (len(thin) > 100) == is_turned
+    seen: dict[int, int] = {}
+    for i in np.concatenate((thin[:40], rows[:60])).tolist():
+        point = middle(corners_of(judge.walls(cells.planes(i))))
+        expected = winding(judge.triangles, point)
+        assert partition.winding[cells.cell[i]] == expected, (layers, is_turned, i, point)
+        seen[expected] = seen.get(expected, 0) + 1
+    may = {0, 1, 2} if layers == 1 or is_turned else {0, 1}  # turned bars that touched may overlap by a rounding
+    assert {0, 1} <= set(seen) <= may and (layers == 2 or seen[2] > 4) and min(seen[0], seen[1]) > 4, seen
