@@ -92,7 +92,8 @@ ROOMS = {
         "lowering", "narrowphase", "certificates", "pairs",
     },
     "papers.partitions": {
-        "errors", "base", "transforms", "numerics", "mesh", "shapes", "lowering", "narrowphase", "surface_queries",
+        "errors", "base", "kernels", "transforms", "numerics", "mesh", "shapes", "lowering", "narrowphase",
+        "surface_queries",
     },
     "papers.polytopes": {
         "errors", "base", "kernels", "transforms", "numerics", "least_distance", "hull", "shapes", "certificates",

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
+from collide.kernels import address_of
+from collide.papers.partitions import descent_kernel as words
 from collide.papers.partitions.partition_tree import EMPTY, PartitionTree
 from collide.papers.partitions.planes import Planes, signs_of
 
@@ -78,6 +81,33 @@ class FinishedTree:
     @property
     def n_leaves(self) -> int:
         return len(self.place)
+
+    @cached_property
+    def _words(self) -> np.ndarray:
+        """(cuts, WORDS) float64, as of `descent_kernel`."""
+        planes, n = self.planes, len(self.plane)
+        out = np.zeros((n, words.WORDS))
+        links = out.view(np.int64)
+        links[:, words.BELOW], links[:, words.ABOVE] = self.below[1::2], self.below[2::2]
+        on_axis = self.plane >= 4 * planes.n
+        k = self.plane[on_axis] - 4 * planes.n
+        links[on_axis, words.AXIS], out[on_axis, words.OFFSET] = planes.axis.rows[k], planes.value.rows[k]
+        f = self.plane[~on_axis]
+        links[~on_axis, words.AXIS] = words.FACET
+        out[~on_axis, :3] = planes.normal[f]
+        out[~on_axis, words.OFFSET] = np.einsum("ij,ij->i", planes.normal[f], planes.origin[f])
+        out[~on_axis, words.ERROR] = 2.0**-48 * planes.permanent[f].sum(axis=1)
+        return out
+
+    def leaves(self, points: np.ndarray) -> np.ndarray:
+        """(k,) int64, the leaf of each point (k, 3), −1 for points on cuts or too near for doubles."""
+        points = np.ascontiguousarray(points)
+        leaf = np.empty(len(points), dtype=np.int64)
+        words.descend(
+            address_of(self._words), len(self.plane), int(self.below[0]), address_of(points), len(points),
+            self.planes.largest, address_of(leaf),
+        )
+        return leaf
 
     def touches(self, points: np.ndarray) -> Touches:
         """The leaves whose closures hold the points (k, 3), and the cuts on which they lie, exactly."""

@@ -127,6 +127,11 @@ class Planes:
         return against
 
     @cached_property
+    def largest(self) -> float:
+        """The largest coordinate of the mesh."""
+        return float(np.abs(self.vertices).max(initial=0.0))
+
+    @cached_property
     def grid_vertices(self) -> np.ndarray:
         """(v, 3) Python integers: the mesh's vertices in units of 2^−grid."""
         above, below = self.integers_of(self.vertices)

@@ -157,11 +157,26 @@ class SpacePartition:
 
         Notes
         -----
-        O(depth) a point on no cut. A point on a cut is sent down both sides, and is on the boundary if touching cells
-        are of both kinds.
+        O(depth) a point on no cut, in a kernel as long as doubles tell sides. A point on a cut is sent down both sides,
+        and is on the boundary if touching cells are of both kinds.
         """
         points, single = checks.vectors("locate", "points", points)
-        checks.refuse_rows("locate", "points", points, np.abs(points).max(axis=1) > LARGEST, f"exceeds {LARGEST:g}")
+        if np.abs(points).max(initial=0.0) > LARGEST:
+            far = np.abs(points).max(axis=1) > LARGEST
+            checks.refuse_rows("locate", "points", points, far, f"exceeds {LARGEST:g}")
+        cell = self._tree.leaves(points)
+        rows = np.flatnonzero(cell < 0)
+        inside, boundary, on_cuts = self.inside[cell], np.zeros(len(points), dtype=bool), rows[:0]
+        if len(rows):
+            inside[rows], boundary[rows], cell[rows], on_cuts = self._touched(points[rows])
+            on_cuts = rows[on_cuts]
+        on_facets = self._on_facets_outside(points, inside, on_cuts)
+        inside[on_facets] = boundary[on_facets] = True
+        answer = Located(inside, boundary, cell)
+        return Located(*(column[0] for column in answer)) if single else answer
+
+    def _touched(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """(inside (k,), boundary (k,), cell (k,), rows on cuts) by all cells that touch the points, not by facets."""
         touched = self._tree.touches(points)
         leaf_inside = self.inside[touched.leaf]
         some, all_ = np.zeros(len(points), dtype=bool), np.ones(len(points), dtype=bool)
@@ -170,18 +185,13 @@ class SpacePartition:
         cell = np.full(len(points), self._tree.n_leaves)
         best = leaf_inside | ~some[touched.point]
         np.minimum.at(cell, touched.point[best], touched.leaf[best])
-        inside = some.copy()
-        inside[self._on_facets_outside(points, touched, some)] = True
-        answer = Located(inside, inside & ~all_, cell)
-        return Located(*(column[0] for column in answer)) if single else answer
+        return some, some & ~all_, cell, np.unique(touched.on_point)
 
-    def _on_facets_outside(self, points: np.ndarray, touched, some: np.ndarray) -> np.ndarray:
+    def _on_facets_outside(self, points: np.ndarray, inside: np.ndarray, on_cuts: np.ndarray) -> np.ndarray:
         """Rows of points on a facet without solid behind: facets touched by cells outside alone."""
         tree = body_of(self.mesh).tree
         thin = thin_facets(self.mesh, tree)
-        suspects = np.zeros(len(points), dtype=bool)
-        suspects[touched.on_point] = True
-        rows = np.flatnonzero(~some & suspects) if thin is None else np.flatnonzero(~some)
+        rows = on_cuts[~inside[on_cuts]] if thin is None else np.flatnonzero(~inside)
         X = poses_at(points[rows])
         hit = np.zeros(len(rows), dtype=bool)
         for facets in (tree, thin):

@@ -140,15 +140,18 @@ def test_points_touch_the_leaves_of_a_walk_in_fractions(name):
     on_facets = np.einsum(
         "ij,ijk->ik", weights / weights.sum(axis=1)[:, None], corners[rng.integers(0, len(corners), 30)]
     )
-    points = np.vstack([on_facets, grown.mesh.vertices[:10], rng.uniform(-3, 3, (20, 3))])
-    touched = grown.finished.touches(points)
+    beside = np.nextafter(on_facets, rng.choice([-np.inf, np.inf], on_facets.shape))
+    far = [(1e50, -1e50, 1e-300)]
+    points = np.vstack([on_facets, grown.mesh.vertices[:10], rng.uniform(-3, 3, (20, 3)), beside, far])
+    touched, leaf = grown.finished.touches(points), grown.finished.leaves(points)
     n_many = 0
     for k, p in enumerate(points):
         with reproducing("p = {p}", p=p):
             expected = naive_leaves(grown, [Fraction(x) for x in p.tolist()])
             assert touched.leaf[touched.point == k].tolist() == expected
+            assert leaf[k] == -1 or [leaf[k]] == expected, "the kernel's leaf is another"
             n_many += len(expected) > 1
-    assert n_many > 8 and (np.diff(touched.point) >= 0).all()
+    assert n_many > 8 and (np.diff(touched.point) >= 0).all() and 20 <= (leaf >= 0).sum() < len(points) - n_many
     exact = exact_points(grown.planes, points)
     unit = Fraction(2) ** grown.planes.grid
     for (x, y, z, w), p in zip(exact, points.tolist()):
