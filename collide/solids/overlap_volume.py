@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from collide.base import argument_checks as checks
+from collide.errors import InvalidArgument
 from collide.shapes.shape import Shape
 from collide.solids.arrangement import Arrangement, arrange
 from collide.solids.limits import Limits
@@ -39,7 +41,7 @@ class OverlapVolume(NamedTuple):
 
 def overlap_volume(
     A: Shape, B: Shape, X_WA, X_WB, *, check_poses: bool = True, progress=None, time_limit: float | None = None,
-    memory: int | None = None,
+    memory: int | None = None, exact: bool = False,
 ) -> OverlapVolume:
     """Volume, centroid and surfaces of the overlap of two posed solids; no mesh is made.
 
@@ -49,21 +51,26 @@ def overlap_volume(
     X_WA, X_WB : (4, 4) poses in the world W [m].
     check_poses : refuse matrices other than rotations.
     progress, time_limit, memory : as of `boolean`.
+    exact : add volumes up in integers, for a bracket of a few units in the last place.
 
     Returns
     -------
     OverlapVolume. Whether the volume is 0 is exact, and so is the coincidence of surfaces: a box on top of
-    another has volume 0 and a patch. Brackets are some 1e-12 of the volume wide, at most 2⁻³²: where doubles leave more
-    open, as for the thinnest overlaps, volumes are added up in integers. Areas and centroids are rounded.
+    another has volume 0 and a patch. Brackets are some 1e-13 of the volume wide, of thousands of shells as well, and at
+    most 2⁻³²: where doubles leave more open, as for the thinnest overlaps, volumes are added up in integers. Areas and
+    centroids are rounded.
 
     Raises
     ------
-    As `boolean`.
+    InvalidArgument : ``exact`` not True or False, and as of `boolean`.
+    InvalidPose, UnsupportedQuery : as of `boolean`.
 
     Notes
     -----
     The cells are the cells of `boolean`, at the same cost less the mesh.
     """
+    if not isinstance(exact, (bool, np.bool_)):
+        raise InvalidArgument(f"overlap_volume: exact must be True or False, got {checks.brief(exact)}")
     operands = [
         solid_operand("overlap_volume", name, shape, X, check_poses)
         for name, shape, X in (("A", A, X_WA), ("B", B, X_WB))
@@ -72,7 +79,7 @@ def overlap_volume(
         arrangement = arrange(operands, limits)
     holds = arrangement.holds()
     triangles, rows = arrangement.boundary(holds[:, 0] & holds[:, 1])
-    volume, size = enclosed(arrangement.points, triangles)
+    volume, size = enclosed(arrangement.points, triangles, exact)
     steps = arrangement.sheets.steps[rows] != 0
     patch, places = _patch(arrangement, holds)
     centroid = volume.centroid if len(triangles) else mean_point(patch, places)

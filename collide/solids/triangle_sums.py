@@ -12,6 +12,7 @@ from collide.kernels import address_of
 from collide.numerics.exact_points import Point, rounded
 from collide.numerics.exact_vectors import cross, inner
 from collide.solids.cut_points import CutPoints
+from collide.solids.joined_parts import components
 from collide.solids.rounded_mesh import used_points
 from collide.solids.rounded_points import rounded_points
 from collide.solids.sum_kernel import SUMS, sum_triangles
@@ -19,6 +20,8 @@ from collide.solids.sum_kernel import SUMS, sum_triangles
 #: Brackets of volumes wider than this share of them are worked out again in integers.
 _WIDEST = 2.0**-33
 _U = 2.0**-53
+#: Above all that underflow may take away from sums of products of coordinates within 1e50.
+_UNDERFLOW = 1e-250
 
 
 class Volume(NamedTuple):
@@ -30,25 +33,34 @@ class Volume(NamedTuple):
     centroid: np.ndarray
 
 
-def enclosed(points: CutPoints, triangles: np.ndarray) -> tuple[Volume, np.ndarray]:
-    """(what closed triangles (k, 3) of points of an arrangement enclose, (k,) areas of them, rounded [m²])."""
+def enclosed(points: CutPoints, triangles: np.ndarray, exact: bool = False) -> tuple[Volume, np.ndarray]:
+    """(what closed triangles (k, 3) of points of an arrangement enclose, (k,) areas of them, rounded [m²]).
+
+    exact : in integers, and not only where doubles leave too much open. A part of triangles joined by points is closed,
+    since every edge is in one part, and sums about a corner of its own: the errors of a shell grow with its size, not
+    with the size of the scene.
+    """
     if not len(triangles):
         return Volume(0.0, 0.0, 0.0, np.zeros(3)), np.zeros(0)
     ids, faces = used_points(triangles, len(points))
     corners, _ = rounded_points(points, ids)
-    start = corners[0].copy()
-    corners -= start
-    # Each difference is off by the rounding of its ends, by less than those ends' last place, and its own.
-    error = 4.0 * _U * float(np.abs(start).max() + np.abs(corners).max())
+    part = components(len(ids), faces.ravel(), faces[:, [1, 2, 0]].ravel())
+    starts = corners[part]
+    corners -= starts
+    # A start is a double, and exact. A corner x is off by u |x| ≤ u (|start| + |x − start|), the difference by u more.
+    error = 1.01 * _U * float(np.abs(starts).max() + 2.0 * np.abs(corners).max())
+    start = starts[0].copy()
+    starts -= start
     sums, areas = np.empty(SUMS), np.empty(len(faces))
     sum_triangles(
-        address_of(corners), len(corners), address_of(faces), len(faces), error, address_of(sums), address_of(areas)
+        address_of(corners), address_of(starts), len(corners), address_of(faces), len(faces), error, address_of(sums),
+        address_of(areas),
     )
-    six, sizes, bound, *moments = sums.tolist()
-    bound += len(faces) * _U * sizes
+    six, rounding, bound, *moments = sums.tolist()
+    bound += rounding
     volume = six / 6.0
-    bound = bound * (1.0 + 1e-9) / 6.0 + 4.0 * _U * abs(volume)
-    if bound <= _WIDEST * volume:
+    bound = bound * (1.0 + 1e-9) / 6.0 + 4.0 * _U * abs(volume) + _UNDERFLOW
+    if not exact and bound <= _WIDEST * volume:
         return Volume(volume, volume - bound, volume + bound, start + np.array(moments) / (4.0 * six)), areas
     return _exactly(points, triangles), areas
 

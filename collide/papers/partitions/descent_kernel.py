@@ -20,8 +20,8 @@ def descend(words_at, n_cuts, root, points_at, n, largest, leaf_at):
     root : a cut, or ~leaf.   largest : no coordinate of the mesh is above.
 
     A normal n of doubles is off by 5 u p, p its permanent, for u = 2^−53 (`planes.py`); n · x − d by 4 u |n|
-    (|x| + |a|) more, a the corner of the facet in d, and |n| ≤ (1 + 5 u) p. Together less than 20 u Σp times the largest
-    coordinate; `ERROR` is 32 u Σp. A coordinate is compared with an axis-parallel plane exactly.
+    (|x| + |a|) more, a the corner of the facet in d, and |n| ≤ (1 + 5 u) p. Together less than 20 u Σp times the
+    largest coordinate; `ERROR` is 32 u Σp. A coordinate is compared with an axis-parallel plane exactly.
     """
     numbers = view_f64(words_at, WORDS * n_cuts)
     links = view_i64(words_at, WORDS * n_cuts)
