@@ -101,7 +101,7 @@ def read_arrays(
             raise InvalidShape(f"{named} is no regular file")
         with path.open("rb") as file:
             if file.read(2) != b"PK":
-                raise InvalidShape(f"{named} is no file that {who}.save wrote. {others}")
+                raise InvalidShape(f"{named} is no .npz file of {who}.save. {others}")
             older = {True: ANY, False: None}
             needed = [name for name, field in fields.items() if field.needed]
             field_of = lambda name: fields.get(name, older[name.startswith(dropped)])

@@ -59,7 +59,7 @@ class Tessellation(tuple):
         return self[1]
 
 
-def tessellate(shape: Shape, *, tolerance: float | None = None, size: float | None = None) -> Tessellation:
+def tessellate(shape: Shape, tolerance: float | None = None, *, size: float | None = None) -> Tessellation:
     """A shape as triangles in its own frame, outward oriented, inside the shape.
 
     Parameters
