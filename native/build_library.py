@@ -41,7 +41,7 @@ C_SOURCES = [
     "capi_compound_casts.c",
     "capi_mesh_contacts.c", "capi_mesh_shapes.c", "capi_curved_contacts.c", "capi_compound_contacts.c",
     "capi_robot.c", "capi_robot_around.c", "capi_robot_checks.c", "capi_robot_file.c", "capi_robot_meshes.c",
-    "capi_robot_motions.c",
+    "capi_robot_motions.c", "capi_robot_objects.c",
     "capi_field.c", "capi_field_cells.c", "capi_field_items.c", "capi_field_pairs.c",
     "capi_world.c", "capi_world_shapes.c", "capi_world_tree.c", "capi_world_pairs.c", "capi_world_outside.c",
     "capi_world_wholes.c", "capi_world_margins.c", "capi_world_casts.c",

@@ -111,7 +111,7 @@ static struct compound_space *compound_space_of(collide_workspace *space)
     if ((made = calloc(1, sizeof *made)) == NULL) return NULL;
     m = made->measures;
     if (space->kernels->write_composite_constants(address_of(m), COMPOUND_MEASURES) != COMPOUND_MEASURES || m[U_PART] != PART ||
-        m[U_BODY] != BODY || m[U_BODY_INTS] != BODY_INTS || m[U_GROUP] != GROUP || m[U_GROUP_BALL] != GROUP_BALL ||
+        m[U_BODY] != BODY || m[U_BODY_INTS] != UNION_BODY || m[U_GROUP] != GROUP || m[U_GROUP_BALL] != GROUP_BALL ||
         m[U_BALL] != BALL_IN_WORLD || m[U_TERM_ROW] != TERM_ROW || m[U_HEADER] != COMPOUND_HEADER || m[U_BLOCK] != BLOCK) {
         free(made);
         return NULL;
@@ -194,7 +194,7 @@ static int fill_tables(struct compound_space *space, const collide_compound *con
     order = (struct placed *)(by_place + n);
     for (which = 0; which < 2; which++) {
         const collide_compound *body = bodies[which];
-        int64_t *row = space->bodies + BODY_INTS * which;
+        int64_t *row = space->bodies + UNION_BODY * which;
         memcpy(ints + INTS * first, body->ints, body->n * INTS * sizeof *ints);
         memcpy(numbers + NUMBERS * first, body->numbers, body->n * NUMBERS * sizeof *numbers);
         memcpy(parts + PART * first, body->parts, body->n * PART * sizeof *parts);

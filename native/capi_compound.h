@@ -5,9 +5,9 @@
 #include "capi_internal.h"
 
 /* Integers of a body: its parts and groups among those of a pair. */
-enum { BODY_FIRST, BODY_COUNT, BODY_FIRST_GROUP, BODY_GROUPS, BODY_INTS };
-/* Doubles of a part, of a body, and of a group; how many stand in a group; doubles of a ball in the world. */
-enum { PART = 19, BODY = 6, GROUP_BALL = 11, GROUP = 4, BALL_IN_WORLD = 5, TERM_ROW = 96 };
+enum { BODY_FIRST, BODY_COUNT, BODY_FIRST_GROUP, BODY_GROUPS, UNION_BODY };
+/* Doubles of a body, and of a group; how many stand in a group; doubles of a ball in the world. */
+enum { BODY = 6, GROUP_BALL = 11, GROUP = 4, BALL_IN_WORLD = 5, TERM_ROW = 96 };
 /* Header of questions (collide/narrowphase/composite/composite_block.py). */
 enum {
     U_CORE, U_INTS_AT, U_NUMBERS_AT, U_PARTS_AT, U_BODIES_AT, U_BODY_BALLS_AT, U_BY_PLACE_AT, U_GROUPS_AT, U_POSES_AT, U_TERMS_AT,
@@ -35,7 +35,7 @@ struct collide_compound {
 
 /* What questions about unions take beside a workspace: the tables of the pair asked about last, and room for its poses. */
 struct compound_space {
-    int64_t header[COMPOUND_HEADER], measures[COMPOUND_MEASURES], bodies[2 * BODY_INTS];
+    int64_t header[COMPOUND_HEADER], measures[COMPOUND_MEASURES], bodies[2 * UNION_BODY];
     int64_t serials[2];
     double balls[2 * BODY];
     size_t capacity, n_parts; /* of the unions, and of the tables: rows of parts */

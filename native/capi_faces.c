@@ -6,8 +6,7 @@
 /* What `make_faces` of collide/lowering/hull_polygons.py says in the header of its memory. */
 enum { OF_FACES, OF_CORNERS, OF_IDS, OF_KEPT, OF_LARGEST };
 
-/* Points of a shape, one after another, as they were given. */
-static const double *points_of(const collide_shape *shape, struct arena *arena)
+double *points_of_hull(const collide_shape *shape, struct arena *arena)
 {
     int64_t n = shape->ints[COUNT], padded = shape->ints[PADDED], k;
     const double *columns = (const double *)(intptr_t)shape->ints[ADDRESS];
@@ -29,7 +28,7 @@ static collide_status make_faces(const collide_shape *shape, struct hull_faces *
     if ((faces = calloc(1, sizeof *faces)) == NULL) return COLLIDE_NO_MEMORY;
     given = round_as_kernels_do();
     arena_begin(&arena);
-    points = points_of(shape, &arena);
+    points = points_of_hull(shape, &arena);
     memory = arena_take(&arena, (size_t)kernels->faces_memory(n));
     if (!arena.failed && kernels->make_faces(address_of(points), n, address_of(memory)) == 0)
         block = cache_lines((size_t)memory[OF_KEPT] * sizeof(double), &faces->held);

@@ -21,6 +21,8 @@
 enum { KIND, COUNT, PADDED, ADDRESS, LOWEST, RANK, TREE, COARSE_AT, INTS };
 enum { RADIUS, REACH, SLOP, PARAMS, NUMBERS = PARAMS + 4 };
 enum { POSE = 15 };
+/* Doubles of a part in the frame of its body (collide/lowering/compound_table.py). */
+enum { PART = 19 };
 /* Kinds (collide/lowering/packed_convex.py), doubles of a block of coordinates, and the exponent where no bit is set. */
 enum { POINTS, CYLINDER, CONE, ELLIPSOID, HALFSPACE };
 enum { COORDINATES = 8, NO_BITS = 2000 };
@@ -129,6 +131,10 @@ struct collide_shape_set {
 /* capi_shapes.c: the convex set of a row of a table: a kind, NUMBERS doubles, n points. */
 collide_status shape_of_row(int64_t kind, const double *numbers, const double *points, size_t n, int may_have_tree,
                             collide_shape **shape);
+
+/* capi_faces.c: points of a hull, one after another, as they were given; NULL where there is no memory. */
+struct arena;
+double *points_of_hull(const collide_shape *shape, struct arena *arena);
 
 /* capi_tree.c: a support tree of n points (n, 3), which are kept; *tree stays NULL where the hull is too small for
    one. */

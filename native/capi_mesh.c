@@ -275,17 +275,14 @@ static int32_t *corners_of_hull(const struct collide_kernels *kernels, struct ar
 static collide_status mesh_of_hull(const collide_shape *shape, collide_mesh *mesh)
 {
     const struct collide_kernels *kernels = kernels_here();
-    const double *coordinates = (const double *)(intptr_t)shape->ints[ADDRESS];
-    int64_t n = shape->ints[COUNT], padded = shape->ints[PADDED], n_facets, k, *faces;
+    int64_t n = shape->ints[COUNT], n_facets, *faces;
     collide_status status = COLLIDE_NO_MEMORY;
     struct arena arena;
     struct hull hull;
     double *points;
     if (kernels == NULL) return COLLIDE_NO_KERNELS;
     arena_begin(&arena);
-    points = arena_take(&arena, (size_t)(3 * n) * 8);
-    for (k = 0; points != NULL && k < 3 * n; k++) points[k] = coordinates[k % 3 * padded + k / 3];
-    if (points != NULL) {
+    if ((points = points_of_hull(shape, &arena)) != NULL) {
         hull = hull_of(kernels, &arena, points, n);
         faces = arena_take(&arena, (size_t)(3 * (hull.n_facets + 1)) * 8);
         mesh->points = malloc(3 * sizeof *mesh->points);

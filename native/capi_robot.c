@@ -40,7 +40,7 @@ static void begin_scene(collide_robot_workspace *space, const int64_t *m)
     scene[OPEN_CAPACITY] = n[F_LINK_PARTS] * n[F_PARTS] + 1;
     if (scene[OPEN_CAPACITY] < LEAST_OPEN) scene[OPEN_CAPACITY] = LEAST_OPEN;
     ZEROED(PART_PLACES_AT, POSE * n[F_PARTS], sizeof(double)), ZEROED(LINKS_AT, POSE * n[F_LINKS], sizeof(double));
-    ZEROED(WORLD_BOXES_AT, BOX * n[F_BODIES], sizeof(double)), ZEROED(PLACED_AT, n[F_PARTS], 8), ZEROED(CANDIDATES_AT, n[F_PARTS] + 1, 8);
+    ZEROED(WORLD_BOXES_AT, BOX * (n[F_BODIES] + MAX_OBJECTS), sizeof(double)), ZEROED(PLACED_AT, n[F_PARTS], 8), ZEROED(CANDIDATES_AT, n[F_PARTS] + 1, 8);
     ZEROED(PAIR_AT, 2, 8), ZEROED(ROW_AT, 1, sizeof(collide_pair)), ZEROED(PAIR_DOUBLES_AT, m[M_DOUBLES], sizeof(double));
     ZEROED(PAIR_INTEGERS_AT, m[M_INTEGERS], 8), ZEROED(OPEN_AT, OPEN_INTS * scene[OPEN_CAPACITY], 8), ZEROED(WALKS_AT, around + 1, 8);
     memcpy(&scene[SLACK], &robot->scalars[S_SLACK], sizeof(double));
@@ -113,6 +113,7 @@ void collide_robot_workspace_free(collide_robot_workspace *workspace)
     if (!IS_HANDLE(workspace, ROBOT_SPACE_WORD)) return;
     end_handle(&workspace->word);
     end_motions(workspace);
+    end_objects(workspace);
     collide_workspace_free(workspace->pairs);
     free(workspace->rows);
     free(workspace->reaches);

@@ -7,7 +7,7 @@
 
 /* Layouts, as Python's modules have them; `robot_layouts_fit` compares them with what the kernels say. */
 enum {
-    JOINT_INTS = 5, JOINT_DOUBLES = 23, BODY_INTS = 4, BOX = 6, PART = 19, NODE_LINK = 3, BODY_SPHERES = 5, SPHERE = 6,
+    JOINT_INTS = 5, JOINT_DOUBLES = 23, BODY_INTS = 4, BOX = 6, NODE_LINK = 3, BODY_SPHERES = 5, SPHERE = 6,
     PART_NUMBERS = 6, MAP_INTS = 5, MAP_DOUBLES = 4,
     LINK_POSE = 12, MATRIX = 16, LANES = 8, OPEN_INTS = 4, OPEN_PAIR = 3, SPHERE_PLACE = 4, INTERVAL = 4, MAX_INTERVALS = 96, MAX_PIECES = 32,
     ITEM = 4, OPEN_INTERVAL = 5, MAX_DEGREE = 15, CURSOR = 3, OPEN_SAMPLE = 2
@@ -50,6 +50,9 @@ enum {
 /* Words of a search for distances, and what its rows are of (collide/robots/nearest_pairs.py). */
 enum { PER, BETWEEN, SLOTS, REACHES_AT, IS_ASKED_AT, N_ROWS, SLOT_OF_AT, SEARCH };
 enum { OF_ROBOT = 0, OF_PAIR = 2, WITH_AROUND = 1, AMONG_ROBOT = 2 };
+
+/* Objects that a workspace carries at once. */
+enum { MAX_OBJECTS = 16 };
 
 /* What a file has as plain numbers (collide/robots/checker_file.py). */
 enum {
@@ -141,6 +144,7 @@ struct collide_robot_workspace {
     double *intervals;         /* open ones, then pairs of meshes, half of the memory each */
     int64_t n_intervals;
     double *X_WBs, *moved, *boxes; /* of bodies around: poses as they stand, poses to be, boxes of their parts */
+    struct robot_objects *objects; /* NULL until something is attached or allowed */
     struct arena arena;            /* all that does not grow */
 };
 
@@ -164,6 +168,9 @@ void end_motions(collide_robot_workspace *space);
 
 /* capi_robot_around.c: bodies around as the file has them, in a workspace's own tables. */
 void begin_around(collide_robot_workspace *space);
+
+/* capi_robot_objects.c */
+void end_objects(collide_robot_workspace *space);
 
 /* capi_robot_meshes.c: bodies of facets, and whether questions name these alone; questions of a workspace, 0 without memory. */
 collide_status read_meshes(collide_robot *robot);

@@ -115,17 +115,17 @@ int begin_meshes(collide_robot_workspace *space)
 {
     const collide_robot *robot = space->robot;
     const int64_t *n = robot->sizes, stride = n[F_AROUND] + n[F_BODIES];
-    int64_t m[MEASURES], *words, *walks, k;
+    int64_t m[MEASURES], wide = stride + MAX_OBJECTS, *words, *walks, k;
     if (n[F_HAS_MESHES] == 0) return 1;
     if (!workspace_sizes(robot->kernels, m) || collide_workspace_create(&space->pairs) != COLLIDE_OK) return 0;
-    words = arena_zeroed(&space->arena, (size_t)(QUESTIONS + QUESTION * n[F_BODIES] * stride), 8);
+    words = arena_zeroed(&space->arena, (size_t)(QUESTIONS + QUESTION * (n[F_BODIES] + MAX_OBJECTS) * wide), 8);
     if (words == NULL || (walks = begin_walks(space, m)) == NULL) return 0;
     words[MEET_CODE] = code_at(&robot->kernels->meet_poses);
     words[GAP_CODE] = code_at(&robot->kernels->gap_poses);
-    words[STRIDE] = stride;
+    words[STRIDE] = wide; /* behind the file's bodies are objects, whose pairs with meshes are left to Python */
     for (k = 0; k < n[F_BODIES] * stride; k++) {
         const int64_t *asked = robot->questions + QUESTION_OF_FILE * k;
-        int64_t *question = words + QUESTIONS + QUESTION * k;
+        int64_t *question = words + QUESTIONS + QUESTION * (k / stride * wide + k % stride);
         question[HOW] = asked[Q_HOW];
         question[HEADER_AT] = header_of(space, m, asked, walks);
         question[POSE_ROW] = asked[Q_ROW];

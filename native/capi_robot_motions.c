@@ -34,7 +34,7 @@ int begin_motions(collide_robot_workspace *space)
     int64_t *header = space->motions;
     SHARED(PATHS_AT, paths), SHARED(PATH_LENGTHS_AT, path_lengths), SHARED(BETWEEN_AT, between);
     header[PATH_STRIDE] = n[F_STRIDE], header[ITEM_CAPACITY] = n[F_ITEMS], header[OPEN_STRIDE] = OPEN_INTERVAL;
-    ZEROED(CONFIGURATION_AT, columns, sizeof(double)), ZEROED(MOVED_AT, n[F_BODIES] * (n[F_STRIDE] + 1), sizeof(double));
+    ZEROED(CONFIGURATION_AT, columns, sizeof(double)), ZEROED(MOVED_AT, (n[F_BODIES] + MAX_OBJECTS) * (n[F_STRIDE] + 1), sizeof(double));
     ZEROED(INTERVALS_AT, INTERVAL * (MAX_INTERVALS + 1), sizeof(double)), ZEROED(ITEMS_AT, ITEM * (n[F_ITEMS] + 1), 8);
     ZEROED(CHANGES_AT, columns, sizeof(double)), ZEROED(POINTS_AT, MAX_DEGREE + 1, sizeof(double));
     ZEROED(BOXES_AT, (MAX_INTERVALS + 1) * 2 * columns, sizeof(double));

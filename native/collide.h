@@ -761,6 +761,29 @@ COLLIDE_API collide_status collide_robot_move_around(collide_robot_workspace *wo
 /* Where a body around, -1 - k of body k, stands for a workspace: as in the file, or as it was moved. */
 COLLIDE_API collide_status collide_robot_pose_around(const collide_robot_workspace *workspace, int32_t body, double X_WB[16]);
 
+/* Attach an object to the link of a body of the robot, for the questions of this workspace alone: a grasped part. object : a union, not
+   copied, of which no part is a half-space: free it once it is detached. X_LS : its pose in the link. padding : what it is swollen by
+   against bodies around [m], >= 0, below 1e6; other than 0 where the file was saved with padding alone. touch : numbers of n_touch bodies, of
+   the robot, objects or around, that are never tested against it, beside those of its own link; all others are. (A world's groups, masks
+   and sleep are not in a file: name bodies that they exclude.) *number : of the object in rows and calls, behind all bodies that there are.
+   Answers are then those of a checker in Python after `attach`, bit by bit. O(bodies + pairs). Spheres and maps, by which some robots
+   are asked faster, are not used while anything is attached: of such robots motions may stay COLLIDE_MOTION_OPEN that Python proves.
+   COLLIDE_TOO_MANY: 16 objects are carried, or more parts than the file has room
+   for, 16 as Python writes it. COLLIDE_UNSUPPORTED: a half-space, or padding where the file has none; beside bodies around or links that are
+   meshes, not convex, configurations and motions are left to Python where the object comes near them, or a motion's time is another one at which it
+   collides. Where it is not COLLIDE_OK nothing has
+   changed. */
+COLLIDE_API collide_status collide_robot_attach(collide_robot_workspace *workspace, int32_t body, const collide_compound *object,
+                                                const double X_LS[16], double padding, const int32_t *touch, size_t n_touch,
+                                                int32_t *number);
+
+/* Take an object away that was attached to this workspace; the numbers of those attached later become less by one. */
+COLLIDE_API collide_status collide_robot_detach(collide_robot_workspace *workspace, int32_t number);
+
+/* Never test n pairs of bodies from now on, two numbers each, in this workspace: of the robot, objects or around. What is allowed of
+   an object is forgotten as it is detached. O(n * pairs). */
+COLLIDE_API collide_status collide_robot_allow(collide_robot_workspace *workspace, const int32_t *pairs, size_t n);
+
 /* Whether each of n configurations collides: hits[k]. A few microseconds each, fastest eight and more at a time. */
 COLLIDE_API collide_status collide_robot_collide(collide_robot_workspace *workspace, const double *configurations, size_t n,
                                                  uint8_t *hits, collide_status *statuses, size_t *failed);

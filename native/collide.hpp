@@ -766,6 +766,17 @@ public:
         return X_WB;
     }
 
+    // An object on the link of a body, for the questions of this workspace; its number. touch : bodies not tested against it.
+    std::int32_t attach(std::int32_t body, const Compound &object, const Pose &X_LS, double padding = 0.0,
+                        Span<const std::int32_t> touch = {}) {
+        std::int32_t number = -1;
+        require(collide_robot_attach(get(), body, object.get(), X_LS.data(), padding, touch.data(), touch.size(), &number));
+        return number;
+    }
+    void detach(std::int32_t number) { require(collide_robot_detach(get(), number)); }
+    // pairs : two numbers each, never tested from now on.
+    void allow(Span<const std::int32_t> pairs) { require(collide_robot_allow(get(), pairs.data(), rows(pairs, 2))); }
+
     Answered<std::uint8_t> collides(Span<const double> configurations) {
         std::size_t n = rows(configurations, columns_);
         return answered<std::uint8_t>(n, [&](auto... out) {

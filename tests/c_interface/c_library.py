@@ -213,6 +213,11 @@ _TYPES = {
     "collide_robot_workspace_free": [c_void_p],
     "collide_robot_move_around": [c_void_p, c_void_p, c_size_t, c_void_p, POINTER(c_size_t)],
     "collide_robot_pose_around": [c_void_p, c_int, c_void_p],
+    "collide_robot_attach": [
+        c_void_p, c_int, c_void_p, c_void_p, c_double, c_void_p, c_size_t, POINTER(c_int),
+    ],
+    "collide_robot_detach": [c_void_p, c_int],
+    "collide_robot_allow": [c_void_p, c_void_p, c_size_t],
     "collide_robot_collide": [c_void_p, c_void_p, c_size_t, c_void_p, c_void_p, POINTER(c_size_t)],
     "collide_robot_distance": [
         c_void_p, c_void_p, c_size_t, c_double, c_uint, c_void_p, c_void_p, c_void_p, POINTER(c_size_t),
@@ -645,6 +650,21 @@ class CRobot:
         failed, numbers = c_size_t(77), np.array(bodies, dtype=np.int32)
         given = numbers.ctypes.data, len(bodies), _doubles(np.asarray(X_WBs)).ctypes.data
         return library().collide_robot_move_around(self.workspace, *given, failed), failed.value
+
+    def attach(
+        self, body: int, compound: CCompound, X_LS: np.ndarray, padding: float = 0.0, touch: tuple[int, ...] = ()
+    ) -> tuple[int, int]:
+        """(status, number of the object)."""
+        number, names = c_int(77), np.array(touch, dtype=np.int32)
+        given = compound.handle, _doubles(X_LS).ctypes.data, padding, names.ctypes.data, len(names)
+        return library().collide_robot_attach(self.workspace, body, *given, number), number.value
+
+    def detach(self, number: int) -> int:
+        return library().collide_robot_detach(self.workspace, number)
+
+    def allow(self, *pairs: tuple[int, int]) -> int:
+        numbers = np.array(pairs, dtype=np.int32)
+        return library().collide_robot_allow(self.workspace, numbers.ctypes.data, len(pairs))
 
     def pose(self, body: int) -> np.ndarray:
         X_WB = np.full((4, 4), 7.0)

@@ -52,8 +52,13 @@ def crowd(rng, n: int, reach: float, *, margins: bool = False) -> collide.World:
     return world
 
 
-def compared(checker: collide.RobotChecker, robot: c.CRobot, q: np.ndarray, q1: np.ndarray) -> Counter:
-    """Whatever C answers has Python's bits; how many of what kind were compared."""
+def compared(
+    checker: collide.RobotChecker, robot: c.CRobot, q: np.ndarray, q1: np.ndarray, *, first_times: bool = True
+) -> Counter:
+    """Whatever C answers has Python's bits; how many of what kind were compared.
+
+    first_times : of motions, too; else a time may be another at which Python finds a collision.
+    """
     told: Counter = Counter()
     statuses, hits = robot.collides(q)
     good = statuses == c.OK
@@ -70,7 +75,10 @@ def compared(checker: collide.RobotChecker, robot: c.CRobot, q: np.ndarray, q1: 
     edges, (statuses, verdicts, times) = checker.certify_edges(q, q1, resolution=0.05), robot.certify(q, q1, 0.05)
     good, known = statuses == c.OK, np.where(edges.free, FREE, np.where(edges.collides, COLLIDES, OPEN))
     assert (verdicts[good] == known[good]).all() and (verdicts[~good] == OPEN).all()
-    assert times[good].tobytes() == edges.time[good].tobytes() and np.isnan(times[~good]).all()
+    others = good & (times != edges.time) & ~(np.isnan(times) & np.isnan(edges.time))
+    assert np.isnan(times[~good]).all() and not (first_times and others.any())
+    at = times[others, None]
+    assert not others.any() or checker.collides(q[others] + at * (q1[others] - q[others])).all()
     told.update({f"edges {kind}": int((known[good] == kind).sum()) for kind in range(3)}, open_edges=int((~good).sum()))
     statuses, hits, times = robot.sample(q, q1, 0.1)
     good = statuses == c.OK
@@ -360,6 +368,124 @@ def test_moves_that_are_refused_move_nothing(tmp_path):
     world.set_margin("b1", 0.01)
     swollen = c.CRobot(saved(checker, tmp_path))
     assert swollen.move([-1], [X]) == (c.UNSUPPORTED, 0) and (swollen.pose(-1) == world.body("b0").X_WB).all()
+
+
+# --- objects that are attached, pairs that are allowed ----------------------------------------------------------------
+
+
+def without_spheres(checker: collide.RobotChecker) -> None:
+    """A checker whose spheres are gone: C does without while anything is attached, which leaves more motions open."""
+    checker._spheres, checker._maps, checker._n_asked, checker._setting = None, None, -(10**9), None
+    checker.prepare()
+    assert checker.setting.spheres is None
+
+
+class Carrying:
+    """A checker and the same robot in C under the same changes of what it carries.
+
+    objects : names of what was attached here, in order.   held : unions in C, which are not copied.
+    """
+
+    def __init__(self, rng, checker: collide.RobotChecker, robot: c.CRobot):
+        self.rng, self.checker, self.robot, self.held = rng, checker, robot, {}
+        self.padding, self.n_before, self.count = 0.0, len(checker.bodies), 0
+
+    @property
+    def objects(self) -> list[str]:
+        return self.checker.bodies[self.n_before :]
+
+    def attach(self) -> None:
+        bodies, around, rng = self.checker.bodies, self.checker.around, self.rng
+        shape = random_link_shape(rng, 0.15)
+        if rng.random() < 0.2:
+            shape = collide.ConvexHull(rng.normal(size=(300, 3)) * 0.08)
+        links = [k for k, body in enumerate(self.checker._bodies) if body.name in self.checker.robot.links]
+        carrier, name, X = int(rng.choice(links)), f"object{self.count}", random_pose(rng, 0.15)
+        touch = rng.choice(len(bodies), 2).tolist() + (-1 - rng.choice(len(around), 2)).tolist()
+        names = [bodies[k] if k >= 0 else around[-1 - k] for k in touch]
+        self.checker.attach(name, bodies[carrier], shape, X, touch=names)
+        self.held[name], self.count = c.CCompound(shape), self.count + 1
+        wanted = c.OK, len(bodies)
+        assert self.robot.attach(carrier, self.held[name], X, self.padding, tuple(touch)) == wanted
+        assert self.checker.bodies[-1] == name
+
+    def detach(self) -> None:
+        name = str(self.rng.choice(self.objects))
+        number = self.checker.bodies.index(name)
+        self.checker.detach(name)
+        assert self.robot.detach(number) == c.OK
+        del self.held[name]
+
+    def allow(self) -> None:
+        bodies, around = self.checker.bodies, self.checker.around
+        a, b = self.rng.choice(len(bodies), 2, replace=False).tolist()
+        other = -1 - int(self.rng.integers(len(around)))
+        for pair, names in (((a, b), (bodies[a], bodies[b])), ((other, a), (around[-1 - other], bodies[a]))):
+            self.checker.allow(*names)
+            assert self.robot.allow(pair, pair[::-1]) == c.OK
+
+    def change(self, step: int) -> None:
+        if step % 4 == 3:
+            self.allow()
+        elif len(self.objects) < 2 or (len(self.objects) < 5 and self.rng.random() < 0.6):
+            self.attach()
+        else:
+            self.detach()
+
+
+@pytest.mark.parametrize("form", ["hulls", "padded", "spheres", "meshes"])
+def test_objects_attached_in_c_have_pythons_bits(form, tmp_path):
+    """After every change, and after moves of bodies around, C has the bits of the checker that carries the same."""
+    rng = rng_of("carried in C", form)
+    if form == "hulls":
+        checker = collide.RobotChecker(random_robot(rng), crowd(rng, 10, 1.5))
+    else:
+        checker = scene_that_moves("hulls" if form == "padded" else form, rng)
+    scene = Carrying(rng, checker, c.CRobot(saved(checker, tmp_path)))
+    without_spheres(checker)
+    scene.padding = 0.01 if form in ("padded", "meshes") else 0.0
+    q, told = random_configurations(rng, checker.robot, 25), Counter()
+    alone, changed = checker.collides(q), 0
+    for step in range(12):
+        scene.change(step)
+        if step % 3 == 2:
+            moved(rng, checker, scene.robot, 3, 1.0)
+        ends = q + rng.normal(size=q.shape) * 0.05
+        told += compared(checker, scene.robot, q, ends, first_times=form != "meshes")
+        hits = checker.collides(q)
+        changed, alone = changed + int((hits != alone).sum()), hits
+    assert told["hits"] > 20 and told["free"] > 20 and changed > 2, (told, changed)
+    assert told["edges 1"] > 10 and told["edges 2"] > 10 and told["rows"] > (300 if form == "meshes" else 900), told
+    while scene.objects:
+        scene.detach()
+    told = compared(copy.copy(checker), scene.robot, q, q + rng.normal(size=q.shape) * 0.05)
+    assert told["open"] == 0 or form == "meshes", told
+
+
+def test_objects_that_cannot_be_carried_are_refused_and_change_nothing(tmp_path):
+    rng = rng_of("refused objects in C")
+    checker = collide.RobotChecker(random_robot(rng), crowd(rng, 4, 1.0))
+    robot, q = c.CRobot(saved(checker, tmp_path)), random_configurations(rng, checker.robot, 40)
+    before, n = robot.collides(q)[1], len(checker.bodies)
+    ball, plane = c.CCompound(collide.Sphere(0.1)), c.CCompound(collide.Halfspace([0, 0, 1.0], 0.0))
+    many = c.CCompound(collide.Compound([(collide.Sphere(0.1), pose(t=(k, 0, 0))) for k in range(17)]))
+    eye = np.eye(4)
+    for given, wanted in (
+        ((n, ball, eye), c.INVALID_ARGUMENT), ((-1, ball, eye), c.INVALID_ARGUMENT),
+        ((0, ball, np.diag([2.0, 1, 1, 1])), c.INVALID_POSE), ((0, ball, eye, -1.0), c.INVALID_ARGUMENT),
+        ((0, ball, eye, np.nan), c.INVALID_ARGUMENT), ((0, ball, eye, 0.0, (n,)), c.INVALID_ARGUMENT),
+        ((0, ball, eye, 0.0, (-5,)), c.INVALID_ARGUMENT), ((0, plane, eye), c.UNSUPPORTED),
+        ((0, ball, eye, 0.01), c.UNSUPPORTED), ((0, many, eye), c.TOO_MANY),
+    ):
+        assert robot.attach(*given) == (wanted, -1), given
+    assert robot.detach(0) == robot.detach(n) == robot.detach(-1) == c.INVALID_ARGUMENT
+    assert robot.allow((0, n)) == robot.allow((0, 1), (-5, 0)) == c.INVALID_ARGUMENT
+    assert (robot.collides(q)[1] == before).all() and 0 < before.sum()
+    far = pose(t=(50.0, 0, 0))
+    numbers = [robot.attach(0, ball, far)[1] for _ in range(16)]
+    assert numbers == list(range(n, n + 16)) and robot.attach(0, ball, far) == (c.TOO_MANY, -1)
+    assert robot.detach(n + 3) == c.OK and robot.attach(0, ball, far) == (c.OK, n + 15)
+    assert (robot.collides(q)[1] == before).all()
 
 
 # --- files that lie ---------------------------------------------------------------------------------------------------

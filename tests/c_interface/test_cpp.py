@@ -391,6 +391,17 @@ int main() {
     } catch (const Error &error) {
         if (error.status() != COLLIDE_INVALID_ARGUMENT || error.index() != 0) return 8;
     }
+    Shape box = Shape::box({0.3, 0.3, 0.4});
+    const collide_shape *parts[] = {box.get()};
+    const Pose at = Pose::at(0.0, 0.0, 0.2);
+    Compound object(parts, Span<const Pose>(&at, 1));
+    const std::vector<std::int32_t> touch = {1};
+    const std::int32_t carried = space.attach(0, object, Pose::at(0.1, 0.0, 0.0), 0.0, touch);
+    put(space.collides(q).rows);
+    space.allow(std::vector<std::int32_t>{carried, -2, -1, carried, 2, carried});
+    put(space.collides(q).rows);
+    space.detach(carried);
+    put(space.collides(q).rows);
     if (robot.column_name(0).empty() || robot.body_name(0).empty() || robot.body_name(-1) != "ball") return 5;
     try {
         space.collides({q.data(), robot.columns() + 1});
@@ -425,6 +436,15 @@ def test_robots_are_pythons(tmp_path):
     world.set_pose("crate", _at(-0.2, 0.1, 0.1))
     assert (checker.collides(q) != hits).any()
     wanted += [checker.collides(q).astype(np.uint8), checker.distances(q, between="world").gradient]
+    held = collide.Compound([(collide.Box(0.3, 0.3, 0.4), _at(0, 0, 0.2))])
+    checker.attach("held", checker.bodies[0], held, _at(0.1, 0, 0), touch=[checker.bodies[1]])
+    wanted.append(checker.collides(q).astype(np.uint8))
+    for name in (*checker.around, checker.bodies[2]):
+        checker.allow("held", name)
+    wanted.append(checker.collides(q).astype(np.uint8))
+    checker.detach("held")
+    wanted.append(checker.collides(q).astype(np.uint8))
+    assert (wanted[-3] != wanted[-2]).any()
     assert told == b"".join(column.tobytes() for column in wanted)
 
 

@@ -717,6 +717,7 @@ static void ask_impact(struct caller *c)
     if (!one_in(&c->s, 5)) m.omega_WA = m.omega_WB;
     most = longest(longest(m.X_WA0.count, m.X_WA1.count), longest(m.X_WB0.count, m.X_WB1.count));
     if (m.omega_WA.xyz != NULL) most = longest(most, m.omega_WA.count);
+    if (most == 0) c->is_bad = 0; /* nothing is asked */
     if (one_in(&c->s, 2)) {
         most = 1, c->is_bad = 0; /* poses of other motions */
         ASK(c, sizeof(collide_time_of_impact), collide_impact(c->space, A, B, X[0], X[1], X[2], X[3], m.omega_WA.xyz, NULL, tolerance,
@@ -1054,6 +1055,30 @@ static void make_and_free(struct caller *c)
     collide_robot_free(robot);
 }
 
+#define ROBOT_SPACE (c->space == NULL ? NULL : c->robot_spaces[c->reply - c->replies][number])
+
+/* An object attached, another taken away, or a pair allowed, for both workspaces. */
+static void change_objects(struct caller *c, size_t number)
+{
+    const collide_robot *robot = c->shared->robots[number];
+    int32_t bodies = (int32_t)collide_robot_bodies(robot), names[4];
+    const collide_compound *object = A_COMPOUND(c);
+    double X[16], padding = one_in(&c->s, 4) ? length(&c->s) : 0.0;
+    int32_t number_of_object = (int32_t)below(&c->s, 4);
+    size_t k, n = below(&c->s, 3), last;
+    a_pose(c, X);
+    c->is_bad = 0;
+    for (k = 0; k < 4; k++) {
+        last = collide_robot_around(robot) + (size_t)bodies + 2;
+        names[k] = (int32_t)below(&c->s, last) - (int32_t)collide_robot_around(robot);
+    }
+    if (one_in(&c->s, 2)) {
+        ASK(c, 0, collide_robot_attach(ROBOT_SPACE, names[0], object, X, padding, names + 1, n, &c->reply->hit));
+        EXPECT(c->replies[0].hit == c->replies[1].hit && c->replies[0].hit >= (IS_OK(c) ? bodies : -1), "an object without a number");
+    } else if (one_in(&c->s, 3)) ASK(c, 0, collide_robot_allow(ROBOT_SPACE, names, n));
+    else ASK(c, 0, collide_robot_detach(ROBOT_SPACE, bodies + number_of_object));
+}
+
 static void ask_robot(struct caller *c)
 {
     size_t number = below(&c->s, ROBOTS), n = 1 + below(&c->s, 12), capacity = capacity_of(c), k, columns;
@@ -1074,7 +1099,7 @@ static void ask_robot(struct caller *c)
     if (resolution > 0.0 && resolution < 0.05) resolution = 0.05;
     for (k = 0; k < 2 * n * columns; k++) if (isfinite(q[k]) && fabs(q[k]) > 10.0) q[k] = 10.0;
     if (one_in(&c->s, 2)) for (k = n * columns; k < 2 * n * columns; k++) q[k] = q[k - n * columns] + between(&c->s, -0.1, 0.1);
-#define ROBOT_SPACE (c->space == NULL ? NULL : c->robot_spaces[c->reply - c->replies][number])
+    if (one_in(&c->s, 4)) change_objects(c, number);
     if (one_in(&c->s, 4)) { /* one body around moves, for both workspaces */
         double X[16], Y[16];
         int32_t body = -1 - (int32_t)below(&c->s, collide_robot_around(robot) + 1);
