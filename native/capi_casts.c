@@ -174,8 +174,9 @@ collide_status collide_cast_batch(collide_workspace *workspace, const collide_sh
     struct cast_question asked;
     const double *of_a, *of_b, *along;
     int64_t step_a, step_b, step_d;
-    size_t n = longer(X_WA, X_WB), k, blamed = 0;
-    collide_status status, worst = COLLIDE_OK;
+    struct batch_statuses reported = {statuses, COLLIDE_OK, 0};
+    size_t n = longer(X_WA, X_WB), k;
+    collide_status status;
     rounding given;
     if (failed != NULL) *failed = 0;
     n = n == 0 || directions.count == 0 ? 0 : n > directions.count ? n : directions.count;
@@ -188,13 +189,8 @@ collide_status collide_cast_batch(collide_workspace *workspace, const collide_sh
         asked.X_WA = of_a + step_a * (int64_t)k;
         asked.X_WB = of_b + step_b * (int64_t)k;
         asked.direction = along + step_d * (int64_t)k;
-        status = cast_once(&asked, contacts + k);
-        if (statuses != NULL) statuses[k] = status;
-        if (status == COLLIDE_OK || worst != COLLIDE_OK) continue;
-        worst = status;
-        blamed = k;
+        put_status(&reported, k, cast_once(&asked, contacts + k));
     }
     round_as_before(given);
-    if (failed != NULL) *failed = blamed;
-    return worst;
+    return end_batch(&reported, failed);
 }

@@ -233,8 +233,9 @@ collide_status collide_impact_batch(collide_workspace *workspace, const collide_
     const double *X[4], *omega[2];
     int64_t steps[6];
     struct motion asked;
-    size_t n = 1, k, blamed = 0;
-    collide_status status, worst = COLLIDE_OK;
+    struct batch_statuses reported = {statuses, COLLIDE_OK, 0};
+    size_t n = 1, k;
+    collide_status status;
     rounding given;
     int j;
     if (failed != NULL) *failed = 0;
@@ -254,13 +255,8 @@ collide_status collide_impact_batch(collide_workspace *workspace, const collide_
     for (k = 0; k < n; k++) {
         for (j = 0; j < 4; j++) asked.X[j] = X[j] + steps[j] * (int64_t)k;
         for (j = 0; j < 2; j++) asked.omega[j] = omega[j] == NULL ? NULL : omega[j] + steps[4 + j] * (int64_t)k;
-        status = answer(&asked, impacts + k);
-        if (statuses != NULL) statuses[k] = status;
-        if (status == COLLIDE_OK || worst != COLLIDE_OK) continue;
-        worst = status;
-        blamed = k;
+        put_status(&reported, k, answer(&asked, impacts + k));
     }
     round_as_before(given);
-    if (failed != NULL) *failed = blamed;
-    return worst;
+    return end_batch(&reported, failed);
 }

@@ -69,6 +69,24 @@ static inline int64_t address_of(const void *place) { return (int64_t)(intptr_t)
 #define PUT_IF_NULL(place, made) __sync_bool_compare_and_swap((place), NULL, (made))
 #endif
 
+/* What n single calls of a batch return: each into `statuses`, unless that is NULL; the first that is not COLLIDE_OK is `worst`. */
+struct batch_statuses {
+    collide_status *statuses, worst;
+    size_t blamed;
+};
+static inline void put_status(struct batch_statuses *of, size_t k, collide_status status)
+{
+    if (of->statuses != NULL) of->statuses[k] = status;
+    if (status == COLLIDE_OK || of->worst != COLLIDE_OK) return;
+    of->worst = status;
+    of->blamed = k;
+}
+static inline collide_status end_batch(const struct batch_statuses *of, size_t *failed)
+{
+    if (failed != NULL) *failed = of->blamed;
+    return of->worst;
+}
+
 /* As many contacts to the caller as there is room for, who may have none: then contacts is NULL. */
 static inline void hand_out_contacts(const collide_contact *rows, size_t count, collide_contact *contacts, size_t capacity)
 {

@@ -101,13 +101,25 @@ static collide_status begin(collide_workspace *space, const collide_mesh *mesh, 
     return *how == BY_FACETS && shape->numbers[SLOP] != 0.0 ? COLLIDE_UNSUPPORTED : COLLIDE_OK;
 }
 
+/* What a walk along the facets says of the pair, a boolean, or a row where `pair` is not NULL; LONG_WAY: *status says why not. */
+static int64_t walk(collide_workspace *space, const collide_mesh *mesh, const collide_shape *shape, const double *X_WM, const double *X_WS,
+                    unsigned flags, collide_pair *pair, collide_status *status)
+{
+    int64_t state = LONG_WAY;
+    rounding given = round_as_kernels_do();
+    *status = why_mesh_pair(space, X_WM, X_WS, flags);
+    if (*status == COLLIDE_UNSUPPORTED)
+        state = ask_facets(space, mesh, shape, X_WM, X_WS, pair == NULL, !(flags & COLLIDE_UNSIGNED), pair);
+    round_as_before(given);
+    return state;
+}
+
 collide_status collide_mesh_shape_collide(collide_workspace *workspace, const collide_mesh *mesh, const collide_shape *shape,
                                           const double X_WM[16], const double X_WS[16], unsigned flags, int *hit)
 {
     const collide_mesh *surface;
     const collide_shape *hull;
     collide_status status;
-    rounding given;
     int64_t state;
     int how;
     if (hit == NULL) return COLLIDE_INVALID_ARGUMENT;
@@ -121,11 +133,7 @@ collide_status collide_mesh_shape_collide(collide_workspace *workspace, const co
         if ((status = hull_of_mesh(mesh, &hull)) != COLLIDE_OK) return status;
         return collide_collide(workspace, hull, shape, X_WM, X_WS, flags, hit);
     }
-    given = round_as_kernels_do();
-    status = why_mesh_pair(workspace, X_WM, X_WS, flags);
-    state = status == COLLIDE_UNSUPPORTED ? ask_facets(workspace, mesh, shape, X_WM, X_WS, 1, 0, NULL) : LONG_WAY;
-    round_as_before(given);
-    if (state == LONG_WAY) return status;
+    if ((state = walk(workspace, mesh, shape, X_WM, X_WS, flags, NULL, &status)) == LONG_WAY) return status;
     *hit = state == MEETS;
     return state == MAYBE_INSIDE ? is_inside(workspace, mesh, X_WM, X_WS, flags, hit) : COLLIDE_OK;
 }
@@ -136,7 +144,6 @@ collide_status collide_mesh_shape_distance(collide_workspace *workspace, const c
     const collide_mesh *surface;
     const collide_shape *hull;
     collide_status status;
-    rounding given;
     int64_t state;
     int how, inside = 0, k;
     if (pair == NULL) return COLLIDE_INVALID_ARGUMENT;
@@ -153,10 +160,7 @@ collide_status collide_mesh_shape_distance(collide_workspace *workspace, const c
         for (k = 0; status == COLLIDE_OK && k < 4; k++) pair->vertices_a[k] = pair->vertices_b[k] = -1; /* of the hull, not of the mesh */
         return status;
     }
-    given = round_as_kernels_do();
-    status = why_mesh_pair(workspace, X_WM, X_WS, flags);
-    state = status == COLLIDE_UNSUPPORTED ? ask_facets(workspace, mesh, shape, X_WM, X_WS, 0, !(flags & COLLIDE_UNSIGNED), pair) : LONG_WAY;
-    round_as_before(given);
+    state = walk(workspace, mesh, shape, X_WM, X_WS, flags, pair, &status);
     if (state != LONG_WAY) status = state == 0 ? is_inside(workspace, mesh, X_WM, X_WS, flags, &inside) : COLLIDE_OK;
     if (inside) status = COLLIDE_UNSUPPORTED;
     if (status != COLLIDE_OK) memset(pair, 0, sizeof *pair);

@@ -1,5 +1,5 @@
 /* Where rays first meet a convex shape, a union or a mesh: `raycast` of collide/casts/raycast.py, by the kernels of ray_parts.py, ray_facets.py
-   and ray_hits.py. What Python decides in integers is told by its proven bracket, or said to be unsupported. */
+   and ray_hits.py. What Python decides in integers is reported by its proven bracket, or said to be unsupported. */
 #include "capi_casts.h"
 #include "capi_compound.h"
 #include "capi_box_tree.h"
@@ -203,8 +203,8 @@ static collide_status cast_rays(struct ray *ray, const struct ray_question *aske
 {
     const double *of_x, *of_o, *of_d;
     int64_t step_x, step_o, step_d;
-    collide_status status, worst = COLLIDE_OK;
-    size_t n = asked->X.count, k, blamed = 0;
+    struct batch_statuses reported = {asked->statuses, COLLIDE_OK, 0};
+    size_t n = asked->X.count, k;
     struct chords chords;
     struct arena arena;
     rounding given;
@@ -229,16 +229,11 @@ static collide_status cast_rays(struct ray *ray, const struct ray_question *aske
         ray->X = of_x + step_x * (int64_t)k;
         ray->origin = of_o + step_o * (int64_t)k;
         ray->direction = of_d + step_d * (int64_t)k;
-        status = cast_ray(ray, asked->max_distance, asked->hits + k);
-        if (asked->statuses != NULL) asked->statuses[k] = status;
-        if (status == COLLIDE_OK || worst != COLLIDE_OK) continue;
-        worst = status;
-        blamed = k;
+        put_status(&reported, k, cast_ray(ray, asked->max_distance, asked->hits + k));
     }
     round_as_before(given);
     arena_end(&arena);
-    if (failed != NULL) *failed = blamed;
-    return worst;
+    return end_batch(&reported, failed);
 }
 
 static struct ray_question question_of(collide_poses X, collide_vectors origins, collide_vectors directions, double max_distance,

@@ -815,7 +815,9 @@ enum {
 };
 
 /* Verdicts on n straight motions q(t) = first + t (last - first), 0 <= t <= 1, of rows of `first` and `last`: proven, not sampled.
-   resolution > 0 : intervals in which no column changes by more are not halved any more [rad or m]. times : NULL, or room for n: a
+   resolution > 0 : intervals in which no column changes by more are not halved any more [rad or m]. A motion along which bodies graze
+   each other is asked at every resolution of its way, some microseconds each, as far as they do: 1e-3 is soon told, 1e-9 may take hours,
+   and nothing else ends a call. times : NULL, or room for n: a
    time of a collision, not always the first; NaN of others. */
 COLLIDE_API collide_status collide_robot_certify(collide_robot_workspace *workspace, const double *first, const double *last,
                                                  size_t n, double resolution, uint8_t *verdicts, double *times,

@@ -1,31 +1,13 @@
 /* A scan of a room as an obstacle: does a robot's link meet it, how far is it away, which points are nearest; the same as voxels.
 
    make && ./point_cloud */
-#include <collide.h>
+#include "helpers.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
 enum { SIDE = 100, POINTS = SIDE * SIDE, POSES = 41, NEAREST = 3 };
-
-/* Leave with a sentence unless all went well. */
-static void require(collide_status status, const char *what)
-{
-    if (status == COLLIDE_OK) return;
-    fprintf(stderr, "%s: %s\n", what, collide_status_text(status));
-    exit(1);
-}
-
-/* A pose that is a shift [m], row by row. */
-static void set_place(double *X, double x, double y, double z)
-{
-    int k;
-    for (k = 0; k < 16; k++) X[k] = k % 5 == 0 ? 1.0 : 0.0;
-    X[3] = x;
-    X[7] = y;
-    X[11] = z;
-}
 
 /* What a sensor might give: a floor with a bump in its middle, a point every 2 cm. */
 static void scan(double *points)

@@ -1,31 +1,13 @@
 /* A gripper of two fingers and a palm over a table: how far down it can go, what a ray sees, when it arrives, what it touches.
 
    make && ./reaching */
-#include <collide.h>
+#include "helpers.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
 enum { PARTS = 3, MOST = 16 };
-
-/* Leave with a sentence unless all went well. */
-static void require(collide_status status, const char *what)
-{
-    if (status == COLLIDE_OK) return;
-    fprintf(stderr, "%s: %s\n", what, collide_status_text(status));
-    exit(1);
-}
-
-/* A pose that is a shift [m], row by row. */
-static void set_place(double *X, double x, double y, double z)
-{
-    int k;
-    for (k = 0; k < 16; k++) X[k] = k % 5 == 0 ? 1.0 : 0.0;
-    X[3] = x;
-    X[7] = y;
-    X[11] = z;
-}
 
 int main(void)
 {

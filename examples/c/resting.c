@@ -1,30 +1,12 @@
 /* Contacts of a box that comes down on a table: one pair, then a fall of a hundred poses in one call.
 
    make && ./resting */
-#include <collide.h>
+#include "helpers.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 
 enum { POSES = 100, MOST = 8 };
-
-/* Leave with a sentence unless all went well. */
-static void require(collide_status status, const char *what)
-{
-    if (status == COLLIDE_OK) return;
-    fprintf(stderr, "%s: %s\n", what, collide_status_text(status));
-    exit(1);
-}
-
-/* A pose that is a shift [m], row by row. */
-static void set_place(double *X, double x, double y, double z)
-{
-    int k;
-    for (k = 0; k < 16; k++) X[k] = k % 5 == 0 ? 1.0 : 0.0;
-    X[3] = x;
-    X[7] = y;
-    X[11] = z;
-}
 
 int main(void)
 {
