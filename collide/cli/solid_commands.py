@@ -135,7 +135,7 @@ def run_solid(args: argparse.Namespace, progress: Callable) -> int:
         "operation": args.operation, "empty": False, **_about(r.mesh), "moved": r.moved,
         "crossing": len(r.self_collisions), "facets_of": facets,
     }
-    _finish(args, name, {name: r.mesh}, about, [f"moved by {brief_length(r.moved)} at most"], progress)
+    _finish(args, name, r.mesh, about, [f"moved by {brief_length(r.moved)} at most"], progress)
     return 0
 
 
@@ -169,7 +169,7 @@ def run_cells(args: argparse.Namespace, progress: Callable) -> int:
         about["portals"] = len(portals.cells)
     else:
         save_cells(args.out, cells)
-    _finish(args, name, {name: mesh}, about, [count(len(cells), "convex cell")], progress)
+    _finish(args, name, mesh, about, [count(len(cells), "convex cell")], progress)
     return 0
 
 
@@ -196,7 +196,7 @@ def run_obstacle(args: argparse.Namespace, progress: Callable) -> int:
     name = f"obstacle {_stem(args.a)} to {_stem(args.b)}"
     moved += r.moved
     about = {**_about(r.mesh), "moved": moved, "crossing": len(r.self_collisions), "pieces": r.n_pieces}
-    _finish(args, name, {name: r.mesh}, about, [f"moved by {brief_length(moved)} at most"], progress)
+    _finish(args, name, r.mesh, about, [f"moved by {brief_length(moved)} at most"], progress)
     return 0
 
 
@@ -264,23 +264,20 @@ def _nothing(args: argparse.Namespace, name: str, about: dict) -> int:
     return 1
 
 
-def _finish(
-    args: argparse.Namespace, name: str, bodies: dict, about: dict, more: list[str], progress: Callable
-) -> None:
+def _finish(args: argparse.Namespace, name: str, mesh, about: dict, more: list[str], progress: Callable) -> None:
     """The summary, the JSON and the page."""
     if args.json:
         write_json({"out": args.out, **about}.items(), args.json)
+    if about.get("crossing"):
+        more = [*more, f"{count(about['crossing'], 'pair')} of facets cross after rounding"]
+    summary = f"{name}: {count(about['facets'], 'facet')}, {volume(about['volume'])}, {', '.join(more)}"
     if args.html:
-        _write_page(args, name, bodies, progress)
+        _write_page(args, name, mesh, summary, progress)
     if "-" not in (args.json, args.html) and not args.quiet:
-        size = f"{count(about['facets'], 'facet')}, {volume(about['volume'])}"
-        crossing = about.get("crossing", 0)
-        if crossing:
-            more = [*more, f"{count(crossing, 'pair')} of facets cross after rounding"]
-        print(f"{args.out}: {name}: {size}, {', '.join(more)}; {os.path.getsize(args.out) / 1000:.0f} kB")
+        print(f"{args.out}: {summary}; {os.path.getsize(args.out) / 1000:.0f} kB")
 
 
-def _write_page(args: argparse.Namespace, name: str, bodies: dict, progress: Callable) -> None:
+def _write_page(args: argparse.Namespace, name: str, mesh, summary: str, progress: Callable) -> None:
     """The result to look at, in the page of a report; no pair is tested."""
     import numpy as np
 
@@ -288,7 +285,7 @@ def _write_page(args: argparse.Namespace, name: str, bodies: dict, progress: Cal
     from collide.reports.state_reports import Stated
     from collide.scenes.description import Scene, SceneBody
 
-    scene = Scene(name, [SceneBody(label, mesh, np.eye(4), source=args.out) for label, mesh in bodies.items()])
+    scene = Scene(name, [SceneBody(name, mesh, np.eye(4), source=args.out)], notes=[summary])
     cli_pages.write_report(args, [Stated("", scene, report.make(scene), None)], progress)
 
 

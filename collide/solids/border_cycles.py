@@ -1,4 +1,4 @@
-"""Cycles of unbalanced edges of a surface, and triangles to close them.
+"""Cycles of unbalanced edges of a surface.
 
 A surface read as a chain of oriented triangles has a border: at every edge, runs in a direction less runs in the
 opposite direction. The border of a chain is balanced at every vertex and falls into cycles. Triangles with the opposite
@@ -58,34 +58,3 @@ def cycles_of(edges: np.ndarray) -> list[np.ndarray]:
                 del path[at:]
             place[here] = len(path)
     return cycles
-
-
-def closing_triangles(points: np.ndarray) -> np.ndarray:
-    """(n − 2, 3) corners, rows of points (n, 3): triangles of the least total area with the polygon as their border.
-
-    The polygon need not be plane. O(n³) by dynamic programming (G. Barequet, M. Sharir, "Filling gaps in the boundary
-    of a polyhedron" (1995)), in n² steps of arrays.
-    """
-    n = len(points)
-    cost, choice = np.zeros((n, n)), np.zeros((n, n), dtype=np.int64)
-    for gap in range(2, n):
-        i = np.arange(n - gap)
-        best = np.full(len(i), np.inf)
-        base = points[i + gap] - points[i]
-        for step in range(1, gap):
-            middle = i + step
-            areas = np.sqrt(np.square(np.cross(points[middle] - points[i], base)).sum(axis=1))
-            total = cost[i, middle] + cost[middle, i + gap] + areas
-            better = total < best
-            best[better] = total[better]
-            choice[i[better], i[better] + gap] = middle[better]
-        cost[i, i + gap] = best
-    triangles: list[tuple[int, int, int]] = []
-    waiting = [(0, n - 1)]
-    while waiting:
-        low, high = waiting.pop()
-        if high - low >= 2:
-            split = int(choice[low, high])
-            triangles.append((low, split, high))
-            waiting += [(low, split), (split, high)]
-    return np.array(triangles, dtype=np.int64).reshape(-1, 3)

@@ -154,7 +154,7 @@ def repaired(
     Steps on a surface that does not close: vertices joined at open edges; repeated facets left out; orientation made
     the same across edges of two facets, by the greater part; walls inside left out; holes closed by triangles of least
     area. Then on all meshes: facets of no area left out, the surface unchanged; parts inside out turned over; crossings
-    resolved in an exact arrangement. O(n log n), n³ for a hole of n edges, 400 at most.
+    resolved in an exact arrangement. O(n log n), n³ for a hole of n edges, 1,000 at most.
     """
     if not isinstance(mesh, Mesh):
         raise InvalidArgument(f"repaired: mesh must be a collide.Mesh, got {brief(mesh)}")
@@ -166,7 +166,9 @@ def repaired(
         limits.stage("closing the surface")
         log = _Log(size, widest)
         chain = _repaired_chain(mesh, weld, log)
-        made = Mesh(chain.vertices, chain.corners) if log.changed else mesh
+        made = Mesh(chain.vertices, chain.corners)
+        if not log.changed and made.solid is mesh.solid:
+            made = mesh
     source, crossing = chain.source, np.zeros((0, 2), dtype=np.int64)
     if crossings and made.solid:
         made, source, crossing = _resolved(made, source, log, progress, time_limit, memory)

@@ -16,11 +16,12 @@ from collide.mesh.mesh_survey import Survey, survey_surface
 from collide.mesh.mesh_topology import COLLAPSED, ONE_SIDED, TURNED
 from collide.mesh.nearest_neighbours import MAX_NEIGHBOURS, PointTree
 from collide.mesh.shell_volumes import without_area
-from collide.solids.border_cycles import border_edges, closing_triangles, cycles_of
+from collide.solids.border_cycles import border_edges, cycles_of
 from collide.solids.joined_parts import components
+from collide.solids.least_triangulation import closing_triangles
 
 #: Edges of a cycle, at most, for triangles of the least area: n³ steps.
-LONGEST_CYCLE = 400
+LONGEST_CYCLE = 1000
 #: The source of a triangle that closes a hole.
 NEW = -1
 _TRIANGLE = np.arange(3, dtype=np.int32)[None]
