@@ -179,6 +179,9 @@ collide_status refuse_direction(collide_workspace *space, const char *caller, si
    t or distance from below.   n_leaves : of leaves side by side, or -1 for the tree. */
 size_t bodies_ahead(const collide_world *world, struct world_space *own, const double question[SWEEP], int of_points, int64_t n_leaves);
 
+/* capi_world_wholes.c: what a body is, "a voxel grid". */
+const char *kind_of_body(const collide_world *world, int64_t body);
+
 /* capi_world_wholes.c: whether a body's shape, mesh or field, the others of which are NULL, was not freed. */
 int is_alive(const collide_shape *shape, const collide_mesh *mesh, const collide_field *field);
 

@@ -148,8 +148,8 @@ collide_status collide_world_cast(const collide_world *world, collide_workspace 
         one = cast_through(world, workspace, &moved, exponent, &hits[k], &asked);
         if (one == COLLIDE_NO_MEMORY) status = no_memory(workspace);
         else if (one != COLLIDE_OK && first == COLLIDE_OK)
-            first = refuse(workspace->message, one, "%s: cast %zu and body %ld: %s", caller, k, (long)world->ids[asked],
-                           collide_status_text(one));
+            first = refuse(workspace->message, one, "%s: cast %zu and body %ld: onto %s: %s", caller, k, (long)world->ids[asked],
+                           kind_of_body(world, asked), collide_status_text(one));
         if (statuses != NULL) statuses[k] = one;
     }
     round_as_before(given);

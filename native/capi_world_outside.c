@@ -12,7 +12,8 @@ typedef char hits_are_rows[sizeof(collide_world_hit) == 96 && offsetof(collide_w
 static collide_status refuse_body(const collide_world *world, collide_workspace *space, const char *what, int64_t body,
                                   collide_status status)
 {
-    return refuse(space->message, status, "%s and body %ld: %s", what, (long)world->ids[body], collide_status_text(status));
+    return refuse(space->message, status, "%s and body %ld: of %s: %s", what, (long)world->ids[body], kind_of_body(world, body),
+                  collide_status_text(status));
 }
 
 /* --- boxes and shapes ----------------------------------------------------------------------------------------------- */
@@ -233,7 +234,8 @@ collide_status collide_world_raycast(const collide_world *world, collide_workspa
         hits[k].ray = (int32_t)k;
         if (one != COLLIDE_OK) leave_open(&hits[k]);
         if (one != COLLIDE_OK && first == COLLIDE_OK)
-            first = refuse(workspace->message, one, "%s: ray %zu touches, or begins on, a surface within rounding", caller, k);
+            first = refuse(workspace->message, one, "%s: ray %zu touches, or begins on, a surface within rounding, or may meet a mesh or a field",
+                           caller, k);
         if (statuses != NULL) statuses[k] = one;
     }
     round_as_before(given);

@@ -136,8 +136,11 @@ static int near_pairs(const collide_world *world, struct world_space *own, doubl
 
 collide_status refuse_pair(const collide_world *world, collide_workspace *space, int64_t key, collide_status status)
 {
-    return refuse(space->message, status, "bodies %ld and %ld: %s", (long)world->ids[first_of(key)],
-                  (long)world->ids[second_of(key)], collide_status_text(status));
+    long a = world->ids[first_of(key)], b = world->ids[second_of(key)];
+    const char *text = collide_status_text(status);
+    if (!is_whole_key(world, key)) return refuse(space->message, status, "bodies %ld and %ld: %s", a, b, text);
+    return refuse(space->message, status, "bodies %ld and %ld: of %s and %s: %s", a, b, kind_of_body(world, first_of(key)),
+                  kind_of_body(world, second_of(key)), text);
 }
 
 collide_status answer_keys(const collide_world *world, collide_workspace *space, const int64_t *keys, size_t n, const double *X_WP,

@@ -9,6 +9,13 @@ int is_alive(const collide_shape *shape, const collide_mesh *mesh, const collide
     return shape != NULL ? IS_HANDLE(shape, SHAPE_WORD) : mesh != NULL ? IS_HANDLE(mesh, MESH_WORD) : IS_HANDLE(field, FIELD_WORD);
 }
 
+const char *kind_of_body(const collide_world *world, int64_t body)
+{
+    const struct whole_body *whole = &world->wholes[body];
+    if (whole->mesh != NULL) return "a mesh";
+    return whole->field == NULL ? "a convex shape" : whole->field->are == BALLS ? "a point cloud" : "a voxel grid";
+}
+
 collide_status make_whole(const collide_mesh *mesh, const collide_field *field, struct whole_body *whole)
 {
     const double *low = mesh != NULL ? mesh->low : field->low, *high = mesh != NULL ? mesh->high : field->high;
