@@ -224,7 +224,7 @@ def test_nearest_to_others(n, k):
     assert np.array_equal(np.take_along_axis(away, ids[:, :m], axis=1), squares[:, :m])
 
 
-@pytest.mark.parametrize("suffix", ["obj", "stl", "ply"])
+@pytest.mark.parametrize("suffix", ["obj", "stl", "ply", "off", "3mf"])
 def test_the_command_writes_the_same_solid(tmp_path, capsys, suffix):
     vertices, faces = pizza_box(100.3)
     text = "".join(f"v {x!r} {y!r} {z!r}\n" for x, y, z in vertices.tolist())
@@ -238,4 +238,4 @@ def test_the_command_writes_the_same_solid(tmp_path, capsys, suffix):
     assert np.array_equal(read.vertices[read.faces], expected.vertices[expected.faces])
     assert cli.main(["locality", str(out), str(out), "--localised", str(out)]) == 2
     assert "one mesh at a time, got 2" in capsys.readouterr().err
-    assert cli.main(["locality", str(out), "--localised", str(tmp_path / "x.off")]) == 2
+    assert cli.main(["locality", str(out), "--localised", str(tmp_path / "x.step")]) == 2
