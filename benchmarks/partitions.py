@@ -147,9 +147,13 @@ def pieces(options: Options, mesh: str) -> list[dict]:
     """Exact pieces, and coacd's: points of a box that hulls put wrongly, or that are in several of them."""
     made = MESHES[mesh]()
     volume, start = made.report.volume, time.process_time()
-    parts = collide.SpacePartition(made).convex_pieces()
-    row = {"volume": volume, "pieces": len(parts), "s": time.process_time() - start,
-           "volume_off": float(parts.volumes.sum() / volume - 1)}
+    partition = collide.SpacePartition(made)
+    merged = partition.convex_pieces()
+    row = {"volume": volume, "pieces": len(merged), "s": time.process_time() - start,
+           "unmerged": len(partition.convex_pieces(merged=False))}
+    start = time.process_time()
+    parts = partition.parts(merged)
+    row |= {"parts_s": time.process_time() - start, "flat": parts.n_flat, "volume_off": parts.excess / parts.volume}
     if not installed(coacd="coacd"):
         return [row]
     import coacd
@@ -157,7 +161,8 @@ def pieces(options: Options, mesh: str) -> list[dict]:
     coacd.set_log_level("error")
     start = time.process_time()
     hulls = [collide.ConvexHull(v) for v, _ in coacd.run_coacd(coacd.Mesh(made.vertices, made.faces), seed=0)]
-    row |= {"coacd_pieces": len(hulls), "coacd_s": time.process_time() - start}
+    row |= {"coacd_pieces": len(hulls), "coacd_s": time.process_time() - start,
+            "coacd_volume_off": sum(collide.Mesh(*collide.tessellate(h)).volume for h in hulls) / volume - 1}
     low, high = made.vertices.min(axis=0) - 0.05, made.vertices.max(axis=0) + 0.05
     spots = np.random.default_rng(0).uniform(low, high, (20_000, 3))
     held = sum(collide.contains(hull, np.eye(4), spots).astype(int) for hull in hulls)

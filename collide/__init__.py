@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from collide.pairs.query import collide, distance
     from collide.papers.hierarchies.hierarchy_queries import walk
     from collide.papers.partitions.cell_records import CellPlanes, ConvexCells
+    from collide.papers.partitions.convex_parts import ConvexParts
     from collide.papers.partitions.portals import Portals
     from collide.papers.partitions.space_partition import Located, PartitionSize, SpacePartition
     from collide.papers.polytopes.convex_polygon import ConvexPolygon
@@ -131,6 +132,7 @@ _HOMES = {
     "collide.motion.impact_rows": ("TimeOfImpact",),
     "collide.papers.polytopes.convex_polygon": ("ConvexPolygon",),
     "collide.papers.partitions.cell_records": ("CellPlanes", "ConvexCells"),
+    "collide.papers.partitions.convex_parts": ("ConvexParts",),
     "collide.papers.partitions.portals": ("Portals",),
     "collide.papers.partitions.space_partition": ("Located", "PartitionSize", "SpacePartition"),
     "collide.pairs.query": ("collide", "distance"),
@@ -177,7 +179,7 @@ _RENAMED = {
 __all__ = [
     "BooleanResult", "Box", "Capsule", "CellOverlaps", "CellPlanes", "Certificate", "CertificateRefused",
     "CertifiedBoxes", "CertifiedEdges", "CertifiedMotion", "CollideError", "Compound", "Cone",
-    "ConfigurationObstacle", "Contacts", "ConvexCells", "ConvexHull", "ConvexPolygon", "Cylinder",
+    "ConfigurationObstacle", "Contacts", "ConvexCells", "ConvexHull", "ConvexParts", "ConvexPolygon", "Cylinder",
     "DrawnConfigurations", "Ellipsoid", "EnclosingSpheres", "FacetPairs", "GridDistances", "HPolytope", "Halfspace",
     "HeightField", "How", "InvalidArgument", "InvalidPose", "InvalidShape", "LinkPair", "Located", "Mesh",
     "MissingExtra", "MotionPlan", "OcTree", "OcTreeLeaves", "OverlapVolume", "Overlay", "PairResult",

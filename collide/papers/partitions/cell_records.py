@@ -53,6 +53,7 @@ class ConvexCells:
     Attributes
     ----------
     cell : (k,) int64, the leaf of the partition each is, or the first of several that it is made of.
+    members, member_rows : (m,) int64, the first leaves of all cells before merging, ascending, and their rows.
     inside : (k,) bool, of the solid.
     vertices : (v, 3) float64 [m], the exact corners rounded; cells may name corners at one place twice.
     error : float [m], no coordinate of a vertex is off by more.
@@ -67,6 +68,9 @@ class ConvexCells:
     def __init__(self, inside: np.ndarray, facets: np.ndarray, parts: list[_Part], source: CellSource):
         self.source = source
         self.cell = np.concatenate([part.cell for part in parts])
+        self.members = np.concatenate([part.members for part in parts])
+        rows_before = np.cumsum([0] + [len(part.cell) for part in parts])
+        self.member_rows = np.concatenate([part.member_rows + n for n, part in zip(rows_before, parts)])
         self.inside = inside[self.cell]
         self.vertices = np.concatenate([part.vertices for part in parts])
         self.error = max((part.error for part in parts), default=0.0)
@@ -110,13 +114,13 @@ class ConvexCells:
         leaves = checks.whole_numbers("ConvexCells.rows_of: leaves", leaves)
         if not len(self):
             return np.full(len(leaves), -1)
-        tree, last = self.source.tree, self.cell.copy()
+        tree, last = self.source.tree, self.members.copy()
         first = tree.first[self.source.whole]
-        row = np.minimum(np.searchsorted(self.cell, first), len(self) - 1)
-        mine = self.cell[row] == first
+        row = np.minimum(np.searchsorted(self.members, first), len(last) - 1)
+        mine = self.members[row] == first
         np.maximum.at(last, row[mine], tree.last[self.source.whole][mine])
-        row = np.maximum(np.searchsorted(self.cell, leaves, "right") - 1, 0)
-        return np.where((self.cell[row] <= leaves) & (leaves <= last[row]), row, -1)
+        row = np.maximum(np.searchsorted(self.members, leaves, "right") - 1, 0)
+        return np.where((self.members[row] <= leaves) & (leaves <= last[row]), self.member_rows[row], -1)
 
     def corners(self, i: int) -> np.ndarray:
         """The corners of a cell, rounded.
@@ -201,10 +205,12 @@ class _Part(NamedTuple):
     axis: np.ndarray
     value: np.ndarray
     side: np.ndarray
+    members: np.ndarray
+    member_rows: np.ndarray
 
 
-def part_of_block(block: CellBlock) -> _Part:
-    """The cells of a block as arrays of their own."""
+def part_of_block(block: CellBlock, members: np.ndarray, member_rows: np.ndarray) -> _Part:
+    """The cells of a block as arrays of their own, with the leaves (m,) merged to cells, and the rows of these."""
     faces, planes = block.faces, block.vertices.planes
     rows, _ = edge_rows(faces)
     used, loops = np.unique(block.edges.vertex.rows[rows], return_inverse=True)
@@ -215,7 +221,7 @@ def part_of_block(block: CellBlock) -> _Part:
         block.leaf, vertices, error,
         np.searchsorted(faces.cell, np.arange(len(block.leaf) + 1)), np.append(0, np.cumsum(faces.count)),
         np.ravel(loops), np.where(on_axis, -1, faces.plane), np.where(on_axis, planes.axis.rows[k], -1),
-        np.where(on_axis, planes.value.rows[k], np.nan), faces.side,
+        np.where(on_axis, planes.value.rows[k], np.nan), faces.side, members, member_rows,
     )
 
 

@@ -74,6 +74,34 @@ def _block(tree: FinishedTree, whole: np.ndarray, wanted: np.ndarray, low, high)
     return CellBlock(leaf[order], faces[np.argsort(faces.cell, kind="stable")], vertices, edges)
 
 
+def cells_within(vertices: Vertices, edges: Edges, low, high, first, count, planes, sides) -> Polygons:
+    """The faces of cells: the box low … high within the half-spaces of planes first[i] … first[i] + count[i] − 1.
+
+    first, count : (c,).   planes, sides : numbers of planes, and where cells lie of them: 1 above, −1 below.
+    """
+    n = len(first)
+    box = _box(vertices, edges, low, high)
+    rows, _ = edge_rows(box)
+    vertex, carrier = edges.vertex.rows[rows], edges.carrier.rows[rows]
+    begin = edges.add(np.tile(vertex, n), np.tile(carrier, n))[::4]  # a cut renames edges: every cell has its own
+    cell = np.repeat(np.arange(n), 6)
+    faces = Polygons(np.tile(box.plane, n), cell, begin, np.full(6 * n, 4), np.tile(box.side, n))
+    for k in range(int(count.max(initial=0))):
+        cut = count > k
+        selected = np.flatnonzero(cut)
+        at = first[selected] + k
+        place, halfspaces = _cut_cells(vertices, edges, _of_cells(faces, cut), np.arange(len(at)), planes[at])
+        of, is_below = (place - 1) // 2, place % 2 == 1
+        wanted = is_below == (sides[at[of]] < 0)
+        if not np.array_equal(np.sort(of[wanted]), np.arange(len(at))):
+            raise AssertionError("half-spaces of a cell have no common volume: please report it")
+        halfspaces = _of_cells(halfspaces, wanted)
+        rest = faces[~cut[faces.cell]]
+        faces = joined(rest, replace(halfspaces, cell=selected[of[wanted][halfspaces.cell]]))
+        faces = faces[np.argsort(faces.cell, kind="stable")]
+    return faces
+
+
 def _of_cells(faces: Polygons, selected: np.ndarray) -> Polygons:
     """The faces of some of the cells, which are numbered anew."""
     number = np.cumsum(selected) - 1

@@ -25,7 +25,7 @@ class Portals(NamedTuple):
 
 
 def portals_of_block(tree: FinishedTree, block: CellBlock, whole: np.ndarray) -> tuple[np.ndarray, ...]:
-    """(leaf of a cell (m,), leaf beyond (m,), middle (m, 3), area (m,)) of faces of a block's cells, each pair once.
+    """(leaf of a cell (m,), leaf beyond (m,), plane (m,), middle (m, 3), area (m,)) of faces of cells, each pair once.
 
     A face is sent down the tree from the root: split by crossing cuts, and sent by a cut in its own plane to the side
     away from its cell. Leaves are numbered as in `cell_blocks`, with `whole`.
@@ -44,7 +44,7 @@ def portals_of_block(tree: FinishedTree, block: CellBlock, whole: np.ndarray) ->
         first = np.where(inner, tree.first[np.where(inner, cut, 0)], ~cut)
         ended = ~inner | whole[np.where(inner, cut, 0)]
         if ended.any():
-            done.append((owner[faces.cell[ended]], first[ended], *_measured(block, faces[ended])))
+            done.append((owner[faces.cell[ended]], first[ended], faces.plane[ended], *_measured(block, faces[ended])))
         faces, cut = faces[~ended], cut[~ended]
         made = cut_polygons(vertices, edges, faces, tree.plane[cut])
         above = made.above.copy()
@@ -55,7 +55,7 @@ def portals_of_block(tree: FinishedTree, block: CellBlock, whole: np.ndarray) ->
         place = np.concatenate((2 * cut[on_one_side] + 1 + above[on_one_side], 2 * both + 1, 2 * both + 2))
         faces = joined(faces[on_one_side], made.minus, made.plus)
     if not done:
-        return (*(np.zeros(0, dtype=np.int64),) * 2, np.zeros((0, 3)), np.zeros(0))
+        return (*(np.zeros(0, dtype=np.int64),) * 3, np.zeros((0, 3)), np.zeros(0))
     return tuple(np.concatenate(columns) for columns in zip(*done))
 
 

@@ -35,6 +35,7 @@ class Vertices:
         self.planes, self.n_exact = planes, 0
         self.xyz, self.names = GrowingRows.empty(float, 3), GrowingRows.empty(np.int64, 3)
         self.error = GrowingRows.empty(float)
+        self._exact, self._is_known = np.empty((0, 4), dtype=object), np.zeros(0, dtype=bool)
         self.n_corners = len(planes.vertices)
         self.add(planes.vertices, np.zeros(self.n_corners), np.full((self.n_corners, 3), -1))
 
@@ -48,6 +49,7 @@ class Vertices:
         """Forget all vertices from the n-th on."""
         for rows in (self.xyz, self.error, self.names):
             rows.cut_back(n)
+        self._is_known[n:] = False
 
     def sides(self, vertex: np.ndarray, cut: np.ndarray) -> Sides:
         """Where vertices (k,) lie of planes (k,): doubles with a bound; by their names; in integers."""
@@ -87,7 +89,18 @@ class Vertices:
         return signs[np.ravel(back)]
 
     def exact(self, vertex: np.ndarray) -> np.ndarray:
-        """(k, 4) Python integers x, y, z, w > 0: the vertices are x / w, … in units of 2^−grid."""
+        """(k, 4) Python integers x, y, z, w > 0: the vertices are x / w, … in units of 2^−grid; worked out once."""
+        more = self.xyz.n - len(self._is_known)
+        if more > 0:
+            more = max(more, self.xyz.n // 2)
+            self._exact = np.concatenate((self._exact, np.empty((more, 4), dtype=object)))
+            self._is_known = np.append(self._is_known, np.zeros(more, dtype=bool))
+        new = np.unique(vertex[~self._is_known[vertex]])
+        if len(new):
+            self._exact[new], self._is_known[new] = self._worked_out(new), True
+        return self._exact[vertex]
+
+    def _worked_out(self, vertex: np.ndarray) -> np.ndarray:
         out = np.empty((len(vertex), 4), dtype=object)
         corner = vertex < self.n_corners
         rows = np.flatnonzero(corner)

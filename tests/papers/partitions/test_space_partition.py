@@ -227,7 +227,7 @@ def test_portals_cover_the_faces_of_cells(name):
     free = partition.convex_pieces(inside=False, box=limits)
     doors = partition.portals(free)
     assert not (partition.locate(doors.middle[doors.area > 1e-6]).inside).any()
-    assert len(np.unique(doors.cells)) == len(free)
+    assert len(np.unique(doors.cells)) == len(free) - (name == "cavity")  # the cavity is a piece without doors
     rows = free.rows_of(np.arange(partition.size.cells))
     assert (rows[free.cell] == np.arange(len(free))).all() and (rows[partition.inside] == -1).all()
     held = np.flatnonzero(~partition.inside & np.isin(np.arange(len(rows)), cells.cell))
