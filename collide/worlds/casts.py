@@ -198,19 +198,19 @@ def _take_first(rows: np.ndarray, pairs: np.ndarray, answers, directions: Direct
     got = CastRows._make(np.concatenate(columns) for columns in zip(*(answer for _, answer in answers)))
     hits = np.flatnonzero(got.hit)
     cast, body = pairs[some[hits]].T
-    none = np.zeros(len(hits), dtype=np.int64)
+    order = np.lexsort((body, got.t[hits, 0], cast))
+    hits, cast, body = hits[order], cast[order], body[order]
+    # Events are numbered in this order, so that of bodies touched at once the first has the least number.
+    number = np.arange(len(hits))
     events = RayEvents(
-        cast, got.t[hits], got.normal[hits], hits, got.item_b[hits], got.proven[hits], got.certified[hits]
+        cast, got.t[hits], got.normal[hits], number, got.item_b[hits], got.proven[hits], got.certified[hits]
     )
-    order = np.lexsort((body, events.t[:, 0], cast))
-    events, body = events.of(order), body[order]
-    at = np.flatnonzero(np.diff(events.ray, prepend=-1))
-    first, row = first_of_each(events), events.ray[at]
+    first, row = first_of_each(events), np.unique(cast)
     t = np.ldexp(first.t, -directions.exponents[row, None])
     columns = {
         "distance": t[:, 0], "lower": t[:, 1], "upper": t[:, 2], "normal": first.normal,
-        "point": got.point[first.facet], "body": body[at], "item": first.item, "facet": none[at] - 1, "hit": True,
-        "certified": first.certified, "at_start": got.at_start[first.facet],
+        "point": got.point[hits[first.facet]], "body": body[first.facet], "item": first.item, "facet": -1, "hit": True,
+        "certified": first.certified, "at_start": got.at_start[hits[first.facet]],
     }
     for name, values in columns.items():
         rows[name][row] = values

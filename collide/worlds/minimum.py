@@ -67,10 +67,10 @@ def _least(packed: PackedWorld, pairs: np.ndarray, limit: float, best: float, wi
     """(least distance, its pair) among pairs (k, 2) and the best so far."""
     bounds, size = _lower_bounds(packed, pairs), _FIRST
     while True:
-        top = best + _ROUNDING * abs(best)
+        top = best + _ROUNDING * abs(best) if best > -np.inf else best  # −inf: two half-spaces
         remain = bounds <= min(top, limit)
         pairs, bounds = pairs[remain], bounds[remain]
-        if not len(pairs) or best == -np.inf:  # −inf: two half-spaces
+        if not len(pairs):
             return best, winner
         nearest = np.argpartition(bounds, size - 1)[:size] if size < len(bounds) else np.arange(len(bounds))
         reach = max(min(limit, top), 0.0)

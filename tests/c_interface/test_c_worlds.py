@@ -254,22 +254,6 @@ def are_equal(wanted: np.ndarray, rows: np.ndarray) -> bool:
     return all(wanted[name].tobytes() == rows[name].tobytes() for name in wanted.dtype.names)
 
 
-def are_casts(python: collide.World, shape, X_WS, directions, wanted, rows, **options) -> bool:
-    """Whether rows are Python's, bit by bit. Of bodies touched at the same place normal and point are those of the body
-    that is named: what `collide.shape_cast` says of it alone.
-    """
-    others = [name for name in WORLD_HIT_DTYPE.names if name not in ("normal", "point")]
-    if any(wanted[name].tobytes() != rows[name].tobytes() for name in others):
-        return False
-    for k in range(len(rows)):
-        if not are_equal(wanted[k : k + 1], rows[k : k + 1]):
-            met = python.body(int(rows["body"][k]))
-            alone = collide.shape_cast(shape, X_WS[k], directions[k], met.shape, met.X_WB, **options)
-            if not ((rows["normal"][k] == alone.normal) & (rows["point"][k] == alone.point)).all():
-                return False
-    return True
-
-
 def scattered(n: int, seed: int = 0) -> tuple[collide.World, CWorld, list[c.CShape]]:
     """n bodies of a few shapes, a third of which hit something."""
     random = np.random.default_rng([93, seed])
@@ -439,8 +423,7 @@ def test_of_bodies_touched_at_the_same_place_the_least_id_is_told():
         wanted = python.shape_cast(shape, X_WS, directions).rows
         _, rows, statuses = own.cast(c.CShape(shape), X_WS, directions)
         for k in np.flatnonzero(statuses == c.OK):
-            others = [name for name in WORLD_HIT_DTYPE.names if name not in ("normal", "point")]
-            assert all(rows[k][name] == wanted[k][name] for name in others), (shape, k, rows[k], wanted[k])
+            assert are_equal(wanted[k : k + 1], rows[k : k + 1]), (shape, k, rows[k], wanted[k])
             if rows["hit"][k]:
                 met = python.body(int(rows["body"][k]))
                 alone = collide.shape_cast(shape, X_WS[k], directions[k], met.shape, met.X_WB)

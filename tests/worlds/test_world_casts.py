@@ -148,3 +148,23 @@ def test_the_first_cast_that_hits_may_be_any():
         hits = world.shape_cast(BALL, np.eye(4), directions)
         assert hits["hit"].astype(int).tolist() == aims, aims
         assert np.allclose(hits["distance"][hits["hit"]], 1.5)
+
+
+def test_of_bodies_touched_at_once_one_body_fills_the_row():
+    """The least id was told beside the point of whichever body came first in the batch."""
+    rng, n_ties = np.random.default_rng(62), 0
+    world, shapes = collide.World(), (collide.Box((1, 1, 1)), collide.Sphere(0.5))
+    for k in range(60):
+        world.add(shapes[k % 2], collide.pose(rng.integers(0, [6, 6, 2]).astype(float)))
+    for shape in (*shapes, collide.Box((2.5, 1.5, 0.5))):
+        for _ in range(120):
+            X, direction = collide.pose(rng.integers(-2, 16, 3) * 0.5), rng.integers(-1, 2, 3) * 1.0
+            if not direction.any():
+                continue
+            row = world.shape_cast(shape, X, direction).rows[0]
+            if row["hit"] and not row["at_start"]:
+                met = world.body(int(row["body"]))
+                alone = collide.shape_cast(shape, X, direction, met.shape, met.X_WB)
+                assert (row["normal"] == alone.normal).all() and (row["point"] == alone.point).all(), (shape, X)
+                n_ties += 1
+    assert n_ties > 25
