@@ -50,7 +50,7 @@ plain() { NUMBA_DISABLE_JIT=1 run plain python -m pytest -q tests/contact/test_f
 matrix() { run matrix bash tests/matrix.sh; }
 machines() {
     local script
-    for script in arm64 free_threads windows macos; do run "$script" bash "tests/machines/$script.sh"; done
+    for script in arm64 late_pythons free_threads windows macos; do run "$script" bash "tests/machines/$script.sh"; done
 }
 soaks() {
     rm -rf "$log/fuzz" # of the last night: a search goes on from its folder only where it is told to

@@ -10,11 +10,7 @@ cd "$(dirname "$0")/../.."
 . tests/machines/debian.sh
 need qemu-aarch64 qemu-user
 chosen=("$@")
-[ ${#chosen[@]} -gt 0 ] || chosen=(
-    tests/c_interface tests/engine/test_closed_forms.py tests/engine/test_exact_answers.py tests/engine/test_symmetry.py
-    tests/pairs/test_batches.py tests/hull/test_exact_hull.py tests/support/test_support_tree_query.py
-    tests/narrowphase/facets/test_surface_distance.py tests/contact/test_mesh_contacts.py
-)
+[ ${#chosen[@]} -gt 0 ] || chosen=(tests/c_interface "${engine_tests[@]}")
 root=$work/arm64 site=$work/arm64-site
 unpacked bookworm arm64 "$root" \
     libc6 libgcc-s1 libstdc++6 zlib1g libexpat1 libffi8 libbz2-1.0 liblzma5 libssl3 libsqlite3-0 libcrypt1 libuuid1 \

@@ -2,6 +2,12 @@
 # checkout. Nothing of the machine's own is changed, and no rights are needed.
 work=$PWD/build/machines
 mkdir -p "$work"
+# Tests of the engine that need no extras, as tests/matrix.sh runs them.
+engine_tests=(
+    tests/engine/test_closed_forms.py tests/engine/test_exact_answers.py tests/engine/test_symmetry.py
+    tests/pairs/test_batches.py tests/hull/test_exact_hull.py tests/support/test_support_tree_query.py
+    tests/narrowphase/facets/test_surface_distance.py tests/contact/test_mesh_contacts.py
+)
 
 skip() { echo "skipped: $*" >&2; exit 77; }
 need() { command -v "$1" > /dev/null || skip "no $1: apt-get install $2"; }
@@ -54,6 +60,20 @@ packages_for() { # FOLDER PLATFORM VERSION ABI PACKAGE...: of PyPI, for a Python
     esac
     python -m pip install --quiet --disable-pip-version-check --target "$1" --only-binary :all: --ignore-requires-python \
         --implementation cp --python-version "$3" ${4:+--abi "$4"} "${kind[@]}" "${@:5}"
+}
+
+late_python() { # VERSION: Debian's newest Python of that version, for x86-64: its command, in $late, with its own C library
+    local home=$work/python$1 path
+    unpacked sid amd64 "$home" libc6 zlib1g libexpat1 libffi8 libssl3t64 libzstd1 libbz2-1.0 liblzma5 libsqlite3-0 libuuid1 \
+        "python$1-minimal" "libpython$1-minimal" "libpython$1-stdlib" "libpython$1-dev"
+    late=$work/python-$1 path=$home/usr/lib/x86_64-linux-gnu
+    # Under --argv0 the script stands for Python's own file: processes that Python starts are started by it, too.
+    cat > "$late" << SHELL
+#!/bin/sh
+PYTHONHOME='$home/usr' exec '$home/usr/lib64/ld-linux-x86-64.so.2' --argv0 '$late' --library-path '$path' \
+    '$home/usr/bin/python$1' "\$@"
+SHELL
+    chmod +x "$late"
 }
 
 python_source() { # SUITE PACKAGE FOLDER: the sources of a Python, as they are without Debian's changes

@@ -27,7 +27,7 @@ free_python=${PYTHON:-$(command -v python3.14t || command -v python3.13t || buil
 version=$("$free_python" -c 'import sys; print("%d.%d" % sys.version_info[:2])')
 site=$work/site-${version}t
 rm -rf "$site"
-packages_for "$site" x86_64 "$version" "cp${version/./}t" numpy pytest hypothesis setuptools
+packages_for "$site" x86_64 "$version" "cp${version/./}t" numpy pytest setuptools
 # Its compiler of kernels has no packages for such a Python: their objects are made by this one.
 trap 'rm -rf emitted' EXIT
 python -c "import sys; sys.path.insert(0, 'native'); import backend; backend.emit(('linux-x86_64',), '')"
@@ -51,21 +51,16 @@ free tests/soak/soak_threads.py --pairs 100 --rounds 3
 free -m pytest -q -p no:cacheprovider -k "not pages_of_help" tests/worlds/test_live_worlds.py tests/narrowphase/test_single_queries.py \
     tests/narrowphase/test_single_call.py tests/pairs/test_batches.py tests/narrowphase/facets/test_mesh_batches.py
 
-home=$work/python3.15 site=$work/site-3.15
-unpacked sid amd64 "$home" libc6 zlib1g libexpat1 libffi8 libssl3t64 libzstd1 libbz2-1.0 liblzma5 \
-    python3.15-minimal libpython3.15-minimal libpython3.15-stdlib libpython3.15-dev
+home=$work/python3.15 site=$work/site-abi3t
+late_python 3.15
 rm -rf "$site"
-packages_for "$site" x86_64 3.15 cp315 numpy pytest hypothesis
+packages_for "$site" x86_64 3.15 cp315 numpy
 COLLIDE_INTERFACE=abi3t COLLIDE_INCLUDE=$site/numpy/_core/include:$home/usr/include/python3.15:$home/usr/include \
     python setup.py -q build --build-lib "$site" > "$work/build.log" 2>&1 || { tail "$work/build.log"; exit 1; }
 [ -e "$site/collide/kernels/_glue.abi3t.so" ]
-late() { # its own C library: another than this machine's
-    PYTHONHOME=$home/usr PYTHONPATH=$site "$home/usr/lib64/ld-linux-x86-64.so.2" \
-        --library-path "$home/usr/lib/x86_64-linux-gnu" "$home/usr/bin/python3.15" "$@"
-}
-late -c '
+PYTHONPATH=$site "$late" -c '
 import sys, collide
 from collide.kernels import library, mode
 assert mode.MODE == mode.COMPILED and library.glue.__file__.endswith(".abi3t.so")
 print(f"Python {sys.version.split()[0]} with the lock, module abi3t: kernels", mode.describe_mode())'
-late tests/soak/soak_threads.py --pairs 100 --rounds 1
+PYTHONPATH=$site "$late" tests/soak/soak_threads.py --pairs 100 --rounds 1
