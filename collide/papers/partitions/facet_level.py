@@ -37,6 +37,7 @@ def cut_along_facets(
             while len(active.cell):
                 active = _round(tree, vertices, edges, active, rng, pivots)
                 tree.other_bytes = bytes_before + (vertices.xyz.n - n_vertices) * 56 + (edges.vertex.n - n_edges) * 16
+                tree.other_bytes += vertices.exact_bytes
             tree.links.append(links_of(tree, vertices, _witnesses(edges, joined(*pivots)), tree.held[n_held:]))
         vertices.cut_back(n_vertices)
         edges.cut_back(n_edges)

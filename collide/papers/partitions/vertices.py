@@ -49,7 +49,7 @@ class Vertices:
         """Forget all vertices from the n-th on."""
         for rows in (self.xyz, self.error, self.names):
             rows.cut_back(n)
-        self._is_known[n:] = False
+        self._exact[n:], self._is_known[n:] = None, False
 
     def sides(self, vertex: np.ndarray, cut: np.ndarray) -> Sides:
         """Where vertices (k,) lie of planes (k,): doubles with a bound; by their names; in integers."""
@@ -125,4 +125,9 @@ class Vertices:
 
     @property
     def n_bytes(self) -> int:
-        return self.xyz.n_bytes + self.error.n_bytes + self.names.n_bytes
+        return self.xyz.n_bytes + self.error.n_bytes + self.names.n_bytes + self.exact_bytes
+
+    @property
+    def exact_bytes(self) -> int:
+        """Bytes of exact vertices: some 100 for each of four integers."""
+        return self._exact.nbytes + 400 * int(np.count_nonzero(self._is_known))
