@@ -245,6 +245,16 @@ def height_over(surface, t, vertex):
 
 
 @kernel
+def note_shift(surface, t, vertex, shift):
+    """A triangle's surface was drawn to a vertex, by no more than ``shift`` from where it was.
+
+    The plane of a thin triangle may be far from all of it: the surface is no farther off than before and the shift.
+    """
+    far = surface.far[0]
+    surface.far[0] = min(max(far, height_over(surface, t, vertex)), far + shift)
+
+
+@kernel
 def farthest_plane(surface, vertex, place):
     """How far a place is from the farthest plane of the triangles at a vertex."""
     farthest = 0.0

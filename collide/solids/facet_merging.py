@@ -8,7 +8,8 @@ number of an input triangle, its source, and with the source a plane and a class
 * a vertex goes where all triangles around are of a single class and within τ of a plane, or of two planes with the
   vertex within τ of a straight border: the polygon around is split into ears.
 
-Each short edge and needless vertex takes a vertex away, and each split shortens the sum of all edges: the work ends.
+Each short edge and needless vertex takes a vertex away, and each split shortens the sum of all edges or leaves fewer
+thin triangles; `_MAX_SPLITS` ends what would go on by turns of both.
 """
 
 from __future__ import annotations
@@ -26,9 +27,9 @@ from collide.solids.closed_surface import (
     cancel,
     edge_length,
     farthest_plane,
-    height_over,
     is_smooth,
     merge,
+    note_shift,
     open_surface,
     over,
     push,
@@ -65,27 +66,39 @@ def _longest_edge(surface, t):
 
 
 @kernel
+def _least_height(surface, i, j, k):
+    """Height of a triangle of three vertices over its longest edge."""
+    a, b, c = vec3_at(surface.points, 3 * i), vec3_at(surface.points, 3 * j), vec3_at(surface.points, 3 * k)
+    longest = max(norm(sub(b, a)), norm(sub(c, b)), norm(sub(a, c)))
+    return norm(cross(sub(b, a), sub(c, a))) / longest if longest > 0.0 else 0.0
+
+
+@kernel
 def _behind(surface, c):
     """The corner at b of a triangle b, a, d behind the edge from corner c at a to b, −1 without.
 
-    A thin triangle with a longer edge is no choice: its turn is first, and every split of two thin triangles shortens
-    the sum of all edges.
+    A thin triangle with a longer edge is no choice: its turn is first. A split at apex p has to shorten the sum of all
+    edges, or leave no thin triangle of both; two thin ones would be split in turns without end.
     """
-    a, b = surface.corners[c], vertex_after(surface, c)
+    a, b, p = surface.corners[c], vertex_after(surface, c), vertex_before(surface, c)
     d = surface.first[b]
     while d >= 0:
         if vertex_after(surface, d) == a:
             longest, _, height = _longest_edge(surface, d // 3)
-            if height > surface.reach or longest == d:
+            apex = vertex_before(surface, d)
+            thinnest = min(_least_height(surface, p, a, apex), _least_height(surface, b, p, apex))
+            is_better = edge_length(surface, p, apex) < edge_length(surface, a, b) or thinnest > surface.reach
+            if is_better and (height > surface.reach or longest == d):
                 return d
         d = surface.following[d]
     return -1
 
 
 @kernel
-def _split_behind(surface, size, c, behind):
+def _split_behind(surface, size, c, behind, height):
     """Give the triangle with the longest edge from corner c way to the triangle behind; returns how many wait.
 
+    height : of the triangle over that edge.
     The triangle a, b and apex p; behind its longest edge b, a, d. Both become p, a, d and b, p, d.
     """
     a, b, p, d = surface.corners[c], vertex_after(surface, c), vertex_before(surface, c), vertex_before(surface, behind)
@@ -97,7 +110,7 @@ def _split_behind(surface, size, c, behind):
         return size
     put(surface, s, p, a, d, surface.sources[t], surface.plane[t])
     put(surface, t, b, p, d, surface.sources[t], surface.plane[t])
-    surface.far[0] = max(surface.far[0], height_over(surface, t, p))
+    note_shift(surface, t, p, height)
     cancel(surface, p)
     return size
 
@@ -122,7 +135,7 @@ def _tidy(surface, size, vertex, with_thin):
         if height <= surface.reach and length > surface.reach:
             behind = _behind(surface, longest)
             if behind >= 0:
-                return True, _split_behind(surface, size, longest, behind)
+                return True, _split_behind(surface, size, longest, behind, height)
         c = surface.following[c]
     return False, size
 

@@ -19,6 +19,7 @@ from collide.solids.closed_surface import (
     height_over,
     is_smooth,
     merge,
+    note_shift,
     put,
     remove,
     vertex_after,
@@ -255,6 +256,15 @@ def _flip(surface, p, q):
 
 
 @kernel
+def _from_line(surface, p, q, x):
+    """How far vertex x is from the line through p and q."""
+    a = vec3_at(surface.points, 3 * p)
+    d, w = sub(vec3_at(surface.points, 3 * q), a), sub(vec3_at(surface.points, 3 * x), a)
+    length = norm(d)
+    return norm(cross(d, w)) / length if length > 0.0 else norm(w)
+
+
+@kernel
 def split_edge(surface, p, q, x):
     """Split an edge in all its triangles at a vertex; False without room."""
     for _ in range(2):
@@ -265,7 +275,7 @@ def split_edge(surface, p, q, x):
                 return False
             remove(surface, t)
             if r != x:
-                surface.far[0] = max(surface.far[0], height_over(surface, t, x))
+                note_shift(surface, t, x, _from_line(surface, p, q, x))
                 put(surface, t, p, x, r, surface.sources[t], surface.plane[t])
                 put(surface, new, x, q, r, surface.sources[t], surface.plane[t])
                 surface.counts[N_TRIANGLES] += 1
@@ -320,7 +330,8 @@ def _split_facet(surface, t, x):
         if y > max(u, v, w) + surface.reach or y < min(u, v, w) - surface.reach:
             return False
     n = cross(sub(b, a), sub(c, a))
-    if abs(dot(n, sub(at, a))) > surface.reach * norm(n):
+    height = abs(dot(n, sub(at, a)))
+    if height > surface.reach * norm(n):
         return False
     if not dot(cross(sub(b, a), sub(at, a)), n) > 0.0 or not dot(cross(sub(c, b), sub(at, b)), n) > 0.0:
         return False
@@ -330,7 +341,7 @@ def _split_facet(surface, t, x):
     if new + 1 >= len(surface.sources):
         return False
     source, plane = surface.sources[t], surface.plane[t]
-    surface.far[0] = max(surface.far[0], height_over(surface, t, x))
+    note_shift(surface, t, x, height / norm(n))
     remove(surface, t)
     put(surface, t, i, j, x, source, plane)
     put(surface, new, j, k, x, source, plane)

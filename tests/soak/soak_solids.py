@@ -34,8 +34,10 @@ import collide
 
 I = np.eye(4)
 FAMILIES = ("general position", "one frame", "an ulp off", "mixed sizes")
-COLUMNS = ("steps", "refused", "open", "crossing", "flat", "volume", "many facets")
-FAILURES = COLUMNS[1:6]
+COLUMNS = ("steps", "refused", "open", "crossing", "flat", "volume", "moved far", "many facets")
+FAILURES = COLUMNS[1:7]
+#: Units in the last place of the largest coordinate: farther is a failure.
+_FAR = 256.0
 #: Facets compared with all others by the naive oracle in every 20th result.
 _NAIVE_EVERY, _NAIVE_MOST = 20, 150
 
@@ -157,6 +159,7 @@ def soak_chain(family: str, seed: list[int], steps: int, tally: Tally, with_peer
             "crossing": crossing or (step % _NAIVE_EVERY == 0 and crosses_by_the_oracle(r.mesh, rng)),
             "flat": has_flat_facets(r.mesh),
             "volume": volume_is_off(r, made, B, X, op, before),
+            "moved far": r.moved > _FAR * np.spacing(np.abs(r.mesh.vertices).max()),
         }
         for name in [name for name, is_wrong in wrong.items() if is_wrong]:
             tally.counts[name] += 1

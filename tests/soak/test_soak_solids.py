@@ -17,6 +17,13 @@ def test_a_chain_is_judged_and_counted(family):
     assert max(tally.moved) > 0.0 and tally.line(family).startswith(family)
 
 
+def test_thin_triangles_are_not_split_in_turns():
+    """Two thin triangles once took turns until a cap, and the surface was said to have moved by 0.3 mm."""
+    tally = soak_solids.Tally()
+    soak_solids.soak_chain("an ulp off", [52, 2, 34], 36, tally, with_peer=False)
+    assert tally.counts["steps"] == 36 and not tally.failed() and max(tally.moved) < 64.0
+
+
 def test_an_engine_without_merging_is_seen(monkeypatch, capsys):
     def unmerged(*arguments):
         return ask(*arguments, rounding="exact")
