@@ -1,18 +1,19 @@
 """How many mesh files are no solids as they are, and how many are once repaired: counts by folder.
 
-    python benchmarks/repaired_meshes.py FOLDER... [--every 5]      # minutes for a thousand files; trimesh reads some
+    python benchmarks/repaired_meshes.py --folders FOLDER... [--every 5]   # minutes for 1,000 files; trimesh reads some
 
-A file counts as a robot's link takes it: all of its meshes together. Times are seconds of the processor.
+Without folders, of pybullet_data. A file counts as a robot's link takes it: all of its meshes together. Times are
+seconds of the processor.
 """
 
 from __future__ import annotations
 
-import argparse
 import time
-from collections import Counter
+from importlib.util import find_spec
 from pathlib import Path
 
 import collide
+from collide.adapters.bench.claims import Claim, Options, main
 from collide.errors import CollideError
 from collide.scenes.loaders.mesh_file import read_mesh
 from collide.scenes.loaders.mesh_shapes import element_shapes
@@ -30,36 +31,37 @@ def solid_as(file: Path, meshes: str) -> bool:
     return all(is_solid(taken.shape) for taken in element_shapes(read_mesh(file, meshes), 1.0, file.name))
 
 
-def counted(folder: Path, every: int) -> Counter:
+def counted(options: Options, folder: Path) -> list[dict]:
     """What becomes of every n-th mesh file below a folder."""
     files = [file for file in sorted(folder.rglob("*")) if file.suffix.lower() in SUFFIXES and file.is_file()]
-    result: Counter = Counter()
-    for file in files[every // 2 :: every]:
+    row = {"files": 0, "no solids": 0, "repaired": 0, "unread": 0, "s a repair": 0.0}
+    for file in files[options.every // 2 :: options.every]:
+        row["files"] += 1
         try:
-            result["files"] += 1
             if not solid_as(file, "mesh"):
-                result["no solids"] += 1
+                row["no solids"] += 1
                 start = time.process_time()
-                result["repaired"] += solid_as(file, "repaired")
-                result["seconds"] += time.process_time() - start
+                row["repaired"] += solid_as(file, "repaired")
+                row["s a repair"] += time.process_time() - start
         except CollideError:
-            result["unread"] += 1
-    return result
+            row["unread"] += 1
+    return [{**row, "s a repair": row["s a repair"] / max(row["no solids"], 1)}]
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folders", nargs="+", type=Path, metavar="FOLDER")
+def cases(options: Options):
+    data = find_spec("pybullet_data")
+    known = [Path(data.origin).parent] if data is not None and data.origin else []
+    for folder in options.folders or known:
+        yield {"folder": folder}
+
+
+def arguments(parser) -> None:
+    parser.add_argument("--folders", nargs="+", type=Path, default=[], metavar="FOLDER", help="of mesh files")
     parser.add_argument("--every", type=int, default=1, metavar="N", help="every n-th file only (1)")
-    args = parser.parse_args()
-    print("| folder | files | no solids | of these repaired | unread | s a repair |")
-    print("| --- | --- | --- | --- | --- | --- |")
-    for folder in args.folders:
-        counts_of = counted(folder, args.every)
-        seconds = counts_of["seconds"] / max(counts_of["no solids"], 1)
-        counts = " | ".join(str(counts_of[name]) for name in ("files", "no solids", "repaired", "unread"))
-        print(f"| {folder.name} | {counts} | {seconds:.2g} |")
+
+
+CLAIMS = [Claim("repaired", "mesh files that are no solids, and are once repaired", cases, counted, everywhere=True)]
 
 
 if __name__ == "__main__":
-    main()
+    main(__doc__, CLAIMS, arguments)

@@ -39,7 +39,10 @@ def _configurations(robot: Robot, name: str, values, others: np.ndarray | None) 
     """(k, dof) of arrays, or of mappings joint → value.   others : values of joints that a mapping leaves out."""
     entries = values if isinstance(values, (list, tuple)) else [values]
     if entries and all(isinstance(entry, Mapping) for entry in entries):
-        return np.array([robot.configuration(entry, others)[0] for entry in entries])
+        try:
+            return np.array([robot.configuration(entry, others)[0] for entry in entries])
+        except InvalidArgument as error:
+            raise InvalidArgument(f"plan: {name}: {error}") from None
     return np.ascontiguousarray(robot.checked_configurations(values, f"plan: {name}"))
 
 
@@ -69,7 +72,7 @@ def sampled_box(robot: Robot, joints: Iterable[str] | None, ends: np.ndarray) ->
         names = checks.listed_texts("plan: joints", joints, "names of joints")
         unknown = [name for name in names if name not in robot.joint_names]
         if unknown or not names:
-            what = f"unknown {brief(unknown[0])}" if unknown else "no name"
+            what = f"unknown {brief(unknown[0])}" if unknown else f"no name in {brief(joints)}"
             raise InvalidArgument(f"plan: joints: {what}; the robot has {listing(robot.joint_names)}")
         moves = np.array([name in names for name in robot.joint_names])
     differs = np.flatnonzero((ends != ends[0]).any(axis=0) & ~moves)

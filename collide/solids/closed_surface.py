@@ -246,9 +246,10 @@ def height_over(surface, t, vertex):
 
 @kernel
 def note_shift(surface, t, vertex, shift):
-    """A triangle's surface was drawn to a vertex, by no more than ``shift`` from where it was.
+    """Count a triangle drawn to a vertex, its surface shifted by no more than ``shift``.
 
-    The plane of a thin triangle may be far from all of it: the surface is no farther off than before and the shift.
+    The plane of a thin triangle may be far from the whole triangle: the surface is no farther off than before and the
+    shift.
     """
     far = surface.far[0]
     surface.far[0] = min(max(far, height_over(surface, t, vertex)), far + shift)

@@ -103,14 +103,22 @@ def test_queries_from_outside():
 def test_an_open_sign_is_counted_as_such():
     world = collide.World()
     world.add(collide.Mesh(*box()), name="box")
-    ball = collide.Compound([(collide.Sphere(0.25), np.eye(4)), (collide.Sphere(0.1), np.eye(4))])
-    world.add(ball, pose(t=(0.1, 0.2, 1.25)), name="ball")
+    # Turned three times over, each by a rounded product: whether the innermost ball touches is beyond its numbers.
+    turn = collide.pose((0, 0, 0), rpy=(0.1, 0.2, 0.3))
+    ball = collide.Compound([(collide.Sphere(0.25), collide.pose((0.1, 0, 0))), (collide.Sphere(0.1), np.eye(4))])
+    for _ in range(2):
+        ball = collide.Compound([(ball, turn)])
+    above = pose(t=(0.1, 0.2, 2.0))
+    touching = above.copy()
+    touching[2, 3] -= collide.distance(collide.Mesh(*box()), ball, np.eye(4), above).distance
+    world.add(ball, touching, name="ball")
     world.add(collide.Cylinder(0.25, 0.5), pose(t=(-0.5, -0.5, 1.25)), name="can")
     assert world.collides() and len(world.collisions()) == 2
     assert world.stats["undecided"] == 1 and world.stats["mesh_pairs"] == 2
     world.allow("box", "can")
     assert world.collides() and world.stats["undecided"] == 1 and world.stats["how"]["undecided"] == 1
-    world.set_pose("ball", pose(t=(0.1, 0.2, 1.25 + 1e-9)))
+    touching[2, 3] += 1e-9
+    world.set_pose("ball", touching)
     assert not world.collides() and world.stats["undecided"] == 0
 
 
