@@ -28,6 +28,10 @@ glue: Any = None
 #: Names of entries that were edited since the library was made: compiled just in time, though the others are in it.
 edited: frozenset[str] = frozenset()
 _UNBUILT = "this installation was built without compiled kernels, for want of a C compiler"
+_UNBUILT_CLONE = (
+    "the kernels of this clone are not built: with a C compiler `pip install -e .` builds them, and in any other folder"
+    " Python imports what `pip install .` installed"
+)
 
 
 def load() -> str:
@@ -44,7 +48,7 @@ def load() -> str:
         )
     built = _built()
     if built is None:
-        return _UNBUILT
+        return _why_unbuilt()
     if "free-threading" in sys.version and any(".abi3." in name for name in built.FILES):
         return "it is for builds of Python with the lock; install collide-robotics again, for this Python"
     edited = _edited(built)
@@ -119,8 +123,14 @@ def library_path() -> str:
     """
     built = _built()
     if built is None:
-        raise FileNotFoundError(f"there is no libcollide: {_UNBUILT}")
+        raise FileNotFoundError(f"there is no libcollide: {_why_unbuilt()}")
     return _path(_library_of(built.FILES))
+
+
+def _why_unbuilt() -> str:
+    """Why the library is missing: Python imports a clone's sources where Python is started in the clone."""
+    is_clone = os.path.exists(os.path.join(os.path.dirname(sources.PACKAGE), "pyproject.toml"))
+    return _UNBUILT_CLONE if is_clone else _UNBUILT
 
 
 def include_folder() -> str:
