@@ -14,6 +14,27 @@ _U = 2.0**-53
 
 
 @kernel
+def posed_facet(poses, X, local, a, b, c):
+    """(corners a, b, c of a facet in W, rounded, a bound of the errors of their coordinates).   X : as of
+    `posed_corner`."""
+    off = max(corner_error(poses, X, local, a), corner_error(poses, X, local, b))
+    p, q, r = posed_corner(poses, X, local, a), posed_corner(poses, X, local, b), posed_corner(poses, X, local, c)
+    return p, q, r, max(off, corner_error(poses, X, local, c))
+
+
+@kernel
+def front_axes(p, q, r):
+    """(u, v): the coordinates in which a facet is seen largest, turning counter-clockwise from its front."""
+    normal = cross(sub(q, p), sub(r, p))
+    axis = 0
+    for k in range(1, 3):
+        if abs(component(normal, k)) > abs(component(normal, axis)):
+            axis = k
+    u, v = (axis + 1) % 3, (axis + 2) % 3
+    return (u, v) if component(normal, axis) > 0.0 else (v, u)
+
+
+@kernel
 def _look_at(facet, ids, m, place, n_vertices, u, v, seen):
     """The points of a polygon seen along an axis, from the facet's first corner; how large the coordinates are.
 
@@ -171,22 +192,12 @@ def clip_parts(
             continue
         X = 16 * body[f]
         a, b, c = int(corners[3 * f]), int(corners[3 * f + 1]), int(corners[3 * f + 2])
-        p, q, r = posed_corner(poses, X, local, a), posed_corner(poses, X, local, b), posed_corner(poses, X, local, c)
-        off = max(corner_error(poses, X, local, a), corner_error(poses, X, local, b))
-        off = max(off, corner_error(poses, X, local, c))
+        p, q, r, off = posed_facet(poses, X, local, a, b, c)
         bound = off
         for k in range(m):
             if ids[k] >= n_vertices:
                 bound = max(bound, error[ids[k] - n_vertices])
-        normal = cross(sub(q, p), sub(r, p))
-        axis = 0
-        for k in range(1, 3):
-            if abs(component(normal, k)) > abs(component(normal, axis)):
-                axis = k
-        u = (axis + 1) % 3
-        v = (axis + 2) % 3
-        if not component(normal, axis) > 0.0:
-            u, v = v, u
+        u, v = front_axes(p, q, r)
         largest = _look_at((a, b, c, p, q, r), ids, m, place, n_vertices, u, v, seen)
         made = clip_polygon(ids, m, seen, bound + off + _U * largest, triangles, count)
         if made < 0:

@@ -3,25 +3,13 @@
 from __future__ import annotations
 
 from collide.kernels import entry, kernel, view_f64, view_i64, view_u8
-from collide.narrowphase.facets.facet_crossings import corner_error, end_of_segment, posed_corner
-from collide.numerics.vec3 import component, cross, max_abs, sub, vec3_at
-from collide.solids.polygon_ears import area_limit
+from collide.narrowphase.facets.facet_crossings import end_of_segment
+from collide.numerics.vec3 import component, max_abs, sub, vec3_at
+from collide.solids.polygon_ears import area_limit, front_axes, posed_facet
 
 #: Facets with more segments, of two bodies or more, are left to the sweep: pairs of segments are tested one by one.
 MAX_SEGMENTS = 64
 _U = 2.0**-53
-
-
-@kernel
-def _axes_of(p, q, r):
-    """(u, v): the coordinates in which a facet is seen largest, turning counter-clockwise from its front."""
-    normal = cross(sub(q, p), sub(r, p))
-    axis = 0
-    for k in range(1, 3):
-        if abs(component(normal, k)) > abs(component(normal, axis)):
-            axis = k
-    u, v = (axis + 1) % 3, (axis + 2) % 3
-    return (u, v) if component(normal, axis) > 0.0 else (v, u)
 
 
 @kernel
@@ -85,12 +73,10 @@ def cross_segments(
         f = rows[row]
         X = 16 * body[f]
         a, b, c = corners[3 * f], corners[3 * f + 1], corners[3 * f + 2]
-        p, q, r = posed_corner(poses, X, local, a), posed_corner(poses, X, local, b), posed_corner(poses, X, local, c)
-        off = max(corner_error(poses, X, local, a), corner_error(poses, X, local, b))
-        off = max(off, corner_error(poses, X, local, c))
+        p, q, r, off = posed_facet(poses, X, local, a, b, c)
         for k in range(first[row], first[row + 1]):
             off = max(off, error[segments[k]])
-        u, v = _axes_of(p, q, r)
+        u, v = front_axes(p, q, r)
         largest = max(max_abs(p), max_abs(q), max_abs(r))
         far = max(max_abs(sub(q, p)), max_abs(sub(r, p)))
         # All points lie in the facet, or farther by their error; differences are rounded.
