@@ -49,6 +49,7 @@ static int reserve(collide_world *world, size_t more)
     rows = n + SPARE;
     if (!(resize(&world->ids, rows, sizeof *world->ids) && resize(&world->X_WBs, rows, 16 * sizeof(double)) &&
           resize(&world->poses, rows, POSE * sizeof(double)) && resize(&world->boxes, rows, 6 * sizeof(double)) &&
+          resize(&world->widened, rows, 6 * sizeof(double)) &&
           resize(&world->row_of, rows, 8) && resize(&world->traits, rows, 8 * TRAITS) && resize(&world->leaf_of, rows, 8) &&
           resize(&world->changed, rows, 8) && resize(&world->first, rows, 8) && resize(&world->is_whole, rows, 8) &&
           resize(&world->unbounded, rows, 8) && resize(&world->numbers, rows, 8) && resize(&world->is_moved, rows, 1) &&
@@ -110,6 +111,7 @@ void collide_world_free(collide_world *world)
     free(world->X_WBs);
     free(world->poses);
     free(world->boxes);
+    free(world->widened);
     free(world->row_of);
     free(world->traits);
     free(world->leaf_of);
@@ -282,6 +284,7 @@ static void close_gaps(collide_world *world)
     world->n = n;
     world->n_changed = 0;
     spread_margins(world);
+    for (k = 0; k < n; k++) widen_box(world, (int64_t)k);
     write_allowed(world);
     make_trees(world);
 }

@@ -68,7 +68,7 @@ struct collide_world {
     int64_t measures[WORLD_MEASURES];
     /* Columns, a row a body in the order of ids; those of removed bodies stay until they are many. */
     int32_t *ids;
-    double *X_WBs, *poses, *boxes;
+    double *X_WBs, *poses, *boxes, *widened; /* widened : boxes with room for margins, where there are some */
     struct whole_body *wholes;
     int64_t *row_of, *traits, *leaf_of, *changed, *first, *is_whole, *unbounded, *numbers;
     uint8_t *is_moved, *is_alive;
@@ -91,10 +91,10 @@ struct collide_world {
 /* What questions about worlds take beside a workspace: lists that grow, and a block of pairs. */
 struct world_space {
     int64_t *keys, *sorted, *pairs, *counts, *stack, *skipped;
-    double *bounds, *rays, *flat_nodes, *widened;
+    double *bounds, *rays, *flat_nodes;
     int64_t *flat_links; /* of a tree of leaves side by side */
     collide_contact *contacts;
-    size_t n_keys, n_counts, n_contacts, n_flat, n_widened;
+    size_t n_keys, n_counts, n_contacts, n_flat;
     double X_WA[16 * BLOCK], X_WB[16 * BLOCK];
     int64_t which[2 * BLOCK];
     collide_pair rows[BLOCK];
@@ -123,11 +123,15 @@ collide_status check_ids(collide_world *world, const char *caller, const char *w
 collide_status check_pairs(collide_world *world, const char *caller, const int32_t *pairs, size_t n);
 
 /* capi_world_margins.c: a margin [m] and that of a pair, its own or the sum of both bodies'. After a change of margins how far boxes
-   spread; a body that is removed. Boxes with room for margins, of which there are some, and how far to walk for those within a margin. */
+   spread; a body that is removed; a box that has changed. */
 double reach_of_key(const collide_world *world, int64_t key, double margin);
 void spread_margins(collide_world *world);
 void forget_margins(collide_world *world, int64_t body);
-double widen_boxes(const collide_world *world, struct world_space *own, double margin);
+void widen_box(collide_world *world, int64_t body);
+
+/* Boxes that the tree is over, with room for margins: two of them come within a distance wherever bodies come within that and their
+   margin. */
+static inline double *tree_boxes(const collide_world *world) { return world->widest > 0.0 ? world->widened : world->boxes; }
 
 /* capi_world_shapes.c: rows of shapes for one more user, with room for it; and one user less. */
 int64_t take_shape(struct shape_rows *table, const collide_shape *shape);
@@ -142,8 +146,9 @@ void tree_header(const collide_world *world, int64_t header[TREE_HEADER]);
 void make_trees(collide_world *world);
 void add_to_trees(collide_world *world, size_t first);
 void take_from_trees(collide_world *world, int64_t body);
-/* Poses and boxes of the bodies whose flags are set; with_tree: of bodies that are in it. */
+/* Poses and boxes of the bodies whose flags are set; with_tree: of bodies that are in it. All leaves by other margins. */
 void move_flagged(collide_world *world, int with_tree);
+void widen_leaves(collide_world *world);
 /* The mean side of an inner node [m]: how far apart bodies are. */
 double spacing_of(const struct body_tree *tree);
 

@@ -7,8 +7,6 @@
 
 /* What a box gets beside its margin, relatively: `widened` of collide/broadphase/bounding_boxes.py. */
 static const double WIDENING = 1.0 / ((int64_t)1 << 50);
-/* What walks reach further for rounding, relatively to coordinates and to the reach: four times the above. */
-static const double ROUNDING = 1.0 / ((int64_t)1 << 48);
 
 /* The place of a pair with a margin of its own, or where it is to go. */
 static size_t place_of_pair(const collide_world *world, int64_t key)
@@ -63,25 +61,26 @@ void forget_margins(collide_world *world, int64_t body)
     if (world->widest > 0.0) spread_margins(world);
 }
 
-/* Boxes are moved outwards by r, at least their share of a margin: two of them then come within a distance wherever bodies come
-   within that and their margin. What is returned holds the distance, two of the largest r, and what sums and differences of
-   coordinates round by. */
-double widen_boxes(const collide_world *world, struct world_space *own, double margin)
+/* A box is moved outwards by r, at least the body's share of its margins and what the sums round by. */
+void widen_box(collide_world *world, int64_t body)
 {
-    double most = 0.0, largest = 0.0;
-    size_t k, axis;
-    memcpy(own->widened, world->boxes, 6 * world->n * sizeof(double));
-    for (k = 0; k < world->n; k++)
-        for (axis = 0; axis < 6; axis++) {
-            double *bound = own->widened + 6 * k + axis, size = fabs(*bound), r;
-            if (!(size < INFINITY)) continue;
-            if (size > largest) largest = size;
-            if (world->spread[k] == 0.0) continue;
-            r = world->spread[k] + (size + world->spread[k]) * WIDENING;
-            if (r > most) most = r;
-            *bound = axis < 3 ? *bound - r : *bound + r;
-        }
-    return (margin + 2.0 * most + largest * ROUNDING) * (1.0 + ROUNDING);
+    const double *box = world->boxes + 6 * body;
+    double *widened = world->widened + 6 * body, spread = world->spread[body], r;
+    int axis;
+    memcpy(widened, box, 6 * sizeof *box);
+    for (axis = 0; axis < 6 && spread > 0.0; axis++) {
+        r = spread + (fabs(box[axis]) + spread) * WIDENING;
+        widened[axis] = axis < 3 ? box[axis] - r : box[axis] + r;
+    }
+}
+
+/* Take other margins: the tree's leaves have room for them. */
+static void take_margins(collide_world *world)
+{
+    rounding given = round_as_kernels_do();
+    spread_margins(world);
+    widen_leaves(world);
+    round_as_before(given);
 }
 
 /* --- changes -------------------------------------------------------------------------------------------------------- */
@@ -106,7 +105,7 @@ collide_status collide_world_set_margins(collide_world *world, const int32_t *id
     if (margins == NULL) return refuse(world->message, COLLIDE_INVALID_ARGUMENT, "%s: margins is NULL", caller);
     if ((status = check_margins(world, caller, margins, n)) != COLLIDE_OK) return status;
     for (k = 0; k < n; k++) world->margins[row_of_id(world, ids[k])] = margins[k];
-    spread_margins(world);
+    take_margins(world);
     return COLLIDE_OK;
 }
 
@@ -148,6 +147,6 @@ collide_status collide_world_set_pair_margins(collide_world *world, const int32_
     if (margins != NULL && !reserve_pairs(world, n)) return refuse(world->message, COLLIDE_NO_MEMORY, "%s: out of memory", caller);
     for (k = 0; k < n; k++)
         put_margin(world, key_of(row_of_id(world, pairs[2 * k]), row_of_id(world, pairs[2 * k + 1])), margins != NULL ? margins + k : NULL);
-    spread_margins(world);
+    take_margins(world);
     return COLLIDE_OK;
 }

@@ -19,12 +19,14 @@ static collide_status refuse_body(const collide_world *world, collide_workspace 
 /* --- boxes and shapes ----------------------------------------------------------------------------------------------- */
 
 /* Numbers of the bodies whose boxes come within a margin of a box, as keys, ascending; *n : how many. 0 where there is no
-   memory. */
-static int boxes_met(const collide_world *world, struct world_space *own, const double box[6], double margin, size_t *n)
+   memory. boxes : of bodies, with room for margins or without. */
+static int boxes_met(const collide_world *world, struct world_space *own, const double *boxes, const double box[6], double margin,
+                     size_t *n)
 {
     int64_t tree[TREE_HEADER], count;
     size_t k;
     tree_header(world, tree);
+    tree[T_BOXES_AT] = address_of(boxes);
     while ((count = world->kernels->boxes_met(address_of(tree), address_of(box), 1, margin, address_of(own->pairs),
                                               (int64_t)own->n_keys)) > (int64_t)own->n_keys)
         if (!fit_keys(own, (size_t)count)) return 0;
@@ -52,7 +54,7 @@ collide_status collide_world_boxes_near(const collide_world *world, collide_work
     memcpy(box, low_W, 3 * sizeof *box);
     memcpy(box + 3, high_W, 3 * sizeof *box);
     given = round_as_kernels_do();
-    if (!boxes_met(world, workspace->world, box, margin, &n)) status = no_memory(workspace);
+    if (!boxes_met(world, workspace->world, world->boxes, box, margin, &n)) status = no_memory(workspace);
     round_as_before(given);
     if (status != COLLIDE_OK) return status;
     for (k = 0; k < n && k < capacity; k++) ids[k] = world->ids[workspace->world->keys[k]];
@@ -89,14 +91,12 @@ static collide_status rows_of_shape(const collide_world *world, collide_workspac
     struct world_space *own = space->world;
     double box[6];
     size_t n, k;
-    double reach = world->widest > 0.0 ? widen_boxes(world, own, limit) : limit;
     box_around(world, shape, X_WS, box);
-    if (!boxes_met(world, own, box, reach, &n)) return no_memory(space);
+    if (!boxes_met(world, own, tree_boxes(world), box, limit, &n)) return no_memory(space);
     for (k = 0; k < n; k++) {
         int64_t body = own->keys[k];
         collide_pair row;
         collide_status status;
-        if (world->widest > 0.0 && !are_near(own->widened + 6 * body, box, limit)) continue;
         if (world->is_whole[body]) status = row_from_outside(world, space, shape, X_WS, body, limit, &row);
         else {
             take_pair(space, shape, shape_of_body(world, body));

@@ -40,10 +40,6 @@ static int begin_question(const collide_world *world, collide_workspace *space)
     if (own->stack == NULL) own->stack = malloc(16 * (size_t)world->measures[W_STACK_OF_PAIRS]);
     if (own->rays == NULL) own->rays = calloc((size_t)(world->measures[W_RAY_DOUBLES] + world->measures[W_RAY_INTEGERS]), 8);
     if (own->stack == NULL || own->rays == NULL || !fit_keys(own, 64 + 4 * world->n)) return 0;
-    if (world->widest > 0.0 && own->n_widened < world->n) {
-        if (more_of((int64_t **)(void *)&own->widened, 12 * world->n) == NULL) return 0;
-        own->n_widened = 2 * world->n;
-    }
     if (world->n < own->n_counts) return 1;
     if (more_of(&own->counts, 2 * world->n + 2) == NULL || more_of(&own->skipped, 2 * world->n + 2) == NULL) return 0;
     own->n_counts = 2 * world->n + 2;
@@ -58,7 +54,6 @@ void free_world_space(struct world_space *own)
     free(own->pairs);
     free(own->bounds);
     free(own->counts);
-    free(own->widened);
     free(own->skipped);
     free(own->stack);
     free(own->rays);
@@ -103,31 +98,19 @@ static int add_unbounded(const collide_world *world, struct world_space *own, co
     return 1;
 }
 
-/* Of n keys those whose boxes, with room for margins, come within a margin. */
-static size_t pairs_widened(const collide_world *world, struct world_space *own, int64_t *tree, double margin, size_t n)
-{
-    int64_t *met = own->pairs, k;
-    tree[T_BOXES_AT] = address_of(own->widened);
-    n = (size_t)world->kernels->tested_pairs(address_of(tree), address_of(own->keys), (int64_t)n, margin, 1, address_of(met));
-    for (k = 0; k < (int64_t)n; k++) own->keys[k] = key_of(met[2 * k], met[2 * k + 1]);
-    return n;
-}
-
 /* Keys of all pairs that are to be tested, boxes within a margin and those of bodies, ascending; *n : how many. 0 where there is no
    memory. */
 static int near_pairs(const collide_world *world, struct world_space *own, double margin, size_t *n)
 {
     int64_t tree[TREE_HEADER], count;
-    double reach = world->widest > 0.0 ? widen_boxes(world, own, margin) : margin;
     size_t k;
     tree_header(world, tree);
-    while ((count = world->kernels->pairs_of_all(address_of(tree), reach, 0, address_of(own->stack), address_of(own->keys),
+    while ((count = world->kernels->pairs_of_all(address_of(tree), margin, 0, address_of(own->stack), address_of(own->keys),
                                                  (int64_t)own->n_keys)) > (int64_t)own->n_keys)
         if (!fit_keys(own, (size_t)count)) return 0;
     *n = (size_t)count;
     for (k = 0; k < world->n_unbounded; k++)
-        if (!add_unbounded(world, own, tree, world->unbounded[k], reach, n)) return 0;
-    if (world->widest > 0.0) *n = pairs_widened(world, own, tree, margin, *n);
+        if (!add_unbounded(world, own, tree, world->unbounded[k], margin, n)) return 0;
     sort_keys(own, *n, world->n);
     return 1;
 }

@@ -29,6 +29,17 @@ static void set_infinite(double *box, double low)
     for (k = 0; k < 6; k++) box[k] = k < 3 ? low : -low;
 }
 
+static void set_box_infinite(collide_world *world, int64_t body, double low)
+{
+    set_infinite(box_of(world, body), low);
+    set_infinite(world->widened + 6 * body, low);
+}
+
+static void put_leaf(collide_world *world, int64_t body)
+{
+    memcpy(world->tree.nodes + 6 * world->leaf_of[body], tree_boxes(world) + 6 * body, 6 * sizeof(double));
+}
+
 static int64_t n_nodes(const struct body_tree *tree) { return tree->sections[tree->n_sections]; }
 
 /* Nodes that there is room for: of all bodies twice as many at most, and some of bodies removed. */
@@ -40,7 +51,7 @@ void tree_header(const collide_world *world, int64_t header[TREE_HEADER])
     header[T_LINKS_AT] = address_of(world->tree.links);
     header[T_N_NODES] = n_nodes(&world->tree);
     header[T_N_FIXED] = world->tree.n_fixed;
-    header[T_BOXES_AT] = address_of(world->boxes);
+    header[T_BOXES_AT] = address_of(tree_boxes(world));
     header[T_N_BOXES] = (int64_t)world->n;
     header[T_TRAITS_AT] = address_of(world->traits);
     header[T_ALLOWED_AT] = address_of(world->allowed_rows);
@@ -82,13 +93,13 @@ static void add_section(collide_world *world, int64_t *bodies, int64_t m)
 {
     struct body_tree *tree = &world->tree;
     int64_t begin = n_nodes(tree), node, end;
-    end = world->kernels->grow_graded(address_of(bodies), m, address_of(world->boxes), (int64_t)world->n, begin,
+    end = world->kernels->grow_graded(address_of(bodies), m, address_of(tree_boxes(world)), (int64_t)world->n, begin,
                                       address_of(tree->links), node_capacity(world), address_of(tree->scratch));
     for (node = begin; node < end; node++) {
         int64_t body = tree->links[LINK * node + BODY];
         if (body < 0) continue;
         world->leaf_of[body] = node;
-        memcpy(tree->nodes + 6 * node, box_of(world, body), 6 * sizeof(double));
+        put_leaf(world, body);
     }
     tree->n_inner[tree->n_sections] = end - begin - m;
     tree->sections[++tree->n_sections] = end;
@@ -111,9 +122,9 @@ void make_trees(collide_world *world)
     world->n_unbounded = 0;
     for (body = 0; body < (int64_t)world->n; body++) {
         world->leaf_of[body] = -1;
-        if (!world->is_alive[body]) set_infinite(box_of(world, body), INFINITE);
+        if (!world->is_alive[body]) set_box_infinite(world, body, INFINITE);
         else if (!is_bounded(world, body)) {
-            set_infinite(box_of(world, body), -INFINITE);
+            set_box_infinite(world, body, -INFINITE);
             world->unbounded[world->n_unbounded++] = body;
         }
     }
@@ -161,7 +172,7 @@ void add_to_trees(collide_world *world, size_t first)
     for (body = (int64_t)first; body < (int64_t)world->n; body++) {
         if (is_bounded(world, body)) world->numbers[m++] = body;
         else {
-            set_infinite(box_of(world, body), -INFINITE);
+            set_box_infinite(world, body, -INFINITE);
             world->unbounded[world->n_unbounded++] = body;
         }
     }
@@ -188,7 +199,7 @@ void take_from_trees(collide_world *world, int64_t body)
     struct body_tree *tree = &world->tree;
     int64_t leaf = world->leaf_of[body], changed = body;
     size_t k, n = 0;
-    set_infinite(box_of(world, body), INFINITE);
+    set_box_infinite(world, body, INFINITE);
     if (leaf < 0) {
         for (k = 0; k < world->n_unbounded; k++)
             if (world->unbounded[k] != body) world->unbounded[n++] = world->unbounded[k];
@@ -202,9 +213,34 @@ void take_from_trees(collide_world *world, int64_t body)
     world->leaf_of[body] = -1;
 }
 
+void widen_leaves(collide_world *world)
+{
+    size_t section;
+    int64_t body;
+    for (body = 0; body < (int64_t)world->n; body++) {
+        widen_box(world, body);
+        if (world->leaf_of[body] >= 0) put_leaf(world, body);
+    }
+    for (section = 0; section < world->tree.n_sections; section++) world->tree.sides[section] = fit(world, section);
+    look_at_sides(world);
+}
+
+/* Give n bodies' leaves their boxes with room for margins; -1 where a box has no end any more, or has one now. */
+static int64_t move_widened(collide_world *world, const int64_t *bodies, int64_t n)
+{
+    int64_t k;
+    for (k = 0; k < n; k++) {
+        widen_box(world, bodies[k]);
+        if (is_bounded(world, bodies[k]) != (world->leaf_of[bodies[k]] >= 0)) return -1;
+        if (world->leaf_of[bodies[k]] >= 0) put_leaf(world, bodies[k]);
+    }
+    return n;
+}
+
 void move_flagged(collide_world *world, int with_tree)
 {
-    int64_t tree[TREE_HEADER], parts[SINGLE_PARTS], n;
+    int64_t tree[TREE_HEADER], parts[SINGLE_PARTS], n, k;
+    int has_margins = world->widest > 0.0;
     parts[P_INTS_AT] = address_of(world->table.ints);
     parts[P_NUMBERS_AT] = address_of(world->table.numbers);
     parts[P_ROW_OF_AT] = address_of(world->row_of);
@@ -213,8 +249,11 @@ void move_flagged(collide_world *world, int with_tree)
     parts[P_N_BODIES] = (int64_t)world->n;
     tree_header(world, tree);
     n = world->kernels->move_single_parts(address_of(parts), address_of(world->X_WBs), address_of(world->is_moved),
-                                          with_tree ? address_of(tree) : 0, spacing_of(&world->tree), address_of(world->numbers));
+                                          with_tree && !has_margins ? address_of(tree) : 0, spacing_of(&world->tree), address_of(world->numbers));
     world->n_changed = tree[T_N_CHANGED];
+    if (has_margins && with_tree) n = move_widened(world, world->numbers, n);
+    else
+        for (k = 0; k < n && has_margins; k++) widen_box(world, world->numbers[k]);
     if (with_tree && n >= 0) refit_above(world, world->numbers, n);
     else if (n < 0) { /* a box that has no end any more, or has one now: all of them, and trees, anew */
         memcpy(world->is_moved, world->is_alive, world->n);

@@ -619,7 +619,7 @@ COLLIDE_API collide_status collide_world_allow(collide_world *world, const int32
 
 /* Margins [m] of n bodies, 0 or within 1e-50 ... 1e50: a tested pair no farther apart than both margins together counts as a hit for
    `collides` and `hits`, is a row of `collisions`, and has its contacts told. Distances are told unchanged. O(bodies) a call: hand
-   over many at once; boxes near each other are looked for within the widest of all margins. */
+   over many at once. */
 COLLIDE_API collide_status collide_world_set_margins(collide_world *world, const int32_t *ids, size_t n, const double *margins);
 
 /* Margins of n pairs of bodies, two ids each, instead of the sum of both bodies'; margins NULL: the pairs lose theirs. */
