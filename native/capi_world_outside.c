@@ -76,15 +76,6 @@ void box_around(const collide_world *world, const collide_shape *shape, const do
     world->kernels->move_single_parts(address_of(parts), address_of(X_WS), address_of(&is_moved), 0, 0.0, address_of(&body));
 }
 
-/* Whether a box of a body comes within a margin of another one, as `boxes_met` has it. */
-static int are_near(const double *of_body, const double *box, double margin)
-{
-    int axis;
-    for (axis = 0; axis < 3; axis++)
-        if (!(of_body[axis] <= box[axis + 3] + margin && box[axis] - margin <= of_body[axis + 3])) return 0;
-    return 1;
-}
-
 static collide_status rows_of_shape(const collide_world *world, collide_workspace *space, const collide_shape *shape,
                                     const double *X_WS, double limit, collide_pair *rows, size_t capacity, size_t *count)
 {

@@ -37,11 +37,15 @@ TOLERANCE = 2.0**-10
 _MAX_SPANS, _FEWEST_RAYS, _MAX_RAYS = 600_000, 400, 6_000
 #: Triangles of a cone, and ways followed after each cut.
 _LAYERS, _FOLLOWED = 6, 4
+#: How often cones are covered anew after the narrowphase refused a corner, and the span of a ray no longer proposed.
+_TRIES, _NO_SPAN = 12, (math.inf, -math.inf)
 #: How far within a K points are taken, as a part of the length; triangles are no nearer to 0 than the second part, and
 #: reach no farther than the third.
 _WITHIN, _NEAREST, _FARTHEST = 2.0**-20, 2.0**-10, 4.0
 #: How far the cones asked about reach beyond the cones, as an angle; more where a moved pose's rounding is more.
 _WIDER, _WIDEST = 2.0**-30, 2.0**-20
+#: Cones with an edge no wider than this angle are not cut.
+_NARROWEST = 2.0**-24
 
 
 def least_depth(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, known: Depth) -> Depth:
@@ -116,20 +120,35 @@ class _Pairs:
 
     def searched(self, known: Depth) -> Depth:
         best, rays = known, _Rays(self)
-        cells = rays.first_cells()
+        cells, least = rays.first_cells(), math.inf
+        for tries_left in reversed(range(_TRIES)):
+            best, leaves = self._cut(best, rays, cells)
+            wanted, refused = best.proven * (1.0 - 2.0 * TOLERANCE), [cells[:0]]
+            for leaf in leaves:
+                distance = self._proven(leaf, best, rays)
+                again = (distance < wanted) & (leaf.distance >= wanted) & (tries_left > 0)
+                least = min(least, distance[~again].min(initial=math.inf))
+                refused.append(leaf.cells[again])
+            cells = np.concatenate(refused)
+            if not len(cells):
+                break
+        return best._replace(least=min(max(best.least, least), best.proven))
+
+    def _cut(self, best: Depth, rays: _Rays, cells: np.ndarray) -> tuple[Depth, list[_Covered]]:
+        """Cones cut until each is covered as far as the shortest way known, or rays run out."""
         leaves: list[_Covered] = []
         n_rays = int(np.clip(_MAX_SPANS / max(len(self.pairs), 1), _FEWEST_RAYS, _MAX_RAYS))
         while len(cells):
             best = self._followed(best, rays)
             covered = _covered(rays, cells, self.holds_0, best.proven)
-            near = np.flatnonzero(covered.distance < best.proven * (1.0 - TOLERANCE))
+            is_near = covered.distance < best.proven * (1.0 - TOLERANCE)
+            near = np.flatnonzero(is_near & (_narrowest_edges(covered.U) > _NARROWEST))
             near = near[np.argsort(covered.distance[near], kind="stable")][: max((n_rays - len(rays.U)) // 2, 0)]
             cut = np.zeros(len(cells), dtype=bool)
             cut[near] = True
             leaves.append(covered.of(~cut))
             cells = rays.cut(cells[cut])
-        least = min(self._proven(cone, best) for cone in leaves if len(cone.cells))
-        return best._replace(least=min(max(best.least, least), best.proven))
+        return best, leaves
 
     def _followed(self, best: Depth, rays: _Rays) -> Depth:
         """The shortest way known after the new rays with the first gaps have been followed."""
@@ -143,11 +162,14 @@ class _Pairs:
                 best = Depth(float(way[3]), proven, way[:3].copy(), best.least)
         return best
 
-    def _proven(self, covered: _Covered, best: Depth) -> float:
-        """The distance up to which cones are covered, as the narrowphase says."""
+    def _proven(self, covered: _Covered, best: Depth, rays: _Rays) -> np.ndarray:
+        """(c,) how far the narrowphase says cones are covered [m].
+
+        Rays that all but touch a K lose the span proposed in doubles where the narrowphase refuses its end.
+        """
         angle = max(_WIDER, 2.0**-44 * (self.size + best.proven) / best.proven)
         if angle > _WIDEST:
-            return 0.0
+            return np.zeros(len(covered.cells))
         U = covered.U
         outwards = U - U.mean(axis=1, keepdims=True)
         U = U + angle * outwards / np.sqrt(np.square(outwards).sum(axis=2, keepdims=True))
@@ -160,13 +182,15 @@ class _Pairs:
             x = (U * r[:, :, None])[some]
             asked = [x] if before is None else [x, (U * before[:, :, None])[some]]
             for points in asked:
-                held = self.hold(np.repeat(pair[some], 3), points.reshape(-1, 3))
-                good[some] &= held.reshape(-1, 3).all(axis=1)
+                held = self.hold(np.repeat(pair[some], 3), points.reshape(-1, 3)).reshape(-1, 3)
+                good[some] &= held.all(axis=1)
+                cone, corner = np.nonzero(~held)
+                rays.spans[covered.cells[some[cone], corner], pair[some[cone]]] = _NO_SPAN
             some = some[good[some]]
             triangles = _distance_of_triangles((U * r[:, :, None])[some])
             distance[some] = np.maximum(distance[some], triangles * (1.0 - 2.0**-40))
             before = r
-        return float(distance.min())
+        return distance
 
 
 class _Covered(NamedTuple):
@@ -256,6 +280,11 @@ def _covered(rays: _Rays, cells: np.ndarray, holds_0: np.ndarray, length: float)
     U = rays.U[cells]
     distance = _distance_of_triangles(U * r[:, :, None])
     return _Covered(cells, U, distance, pairs, radii)
+
+
+def _narrowest_edges(corners: np.ndarray) -> np.ndarray:
+    """(c,) the shortest sides of triangles (c, 3, 3)."""
+    return np.sqrt(np.square(np.roll(corners, -1, axis=1) - corners).sum(axis=2)).min(axis=1)
 
 
 def _distance_of_triangles(corners: np.ndarray) -> np.ndarray:
