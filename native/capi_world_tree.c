@@ -225,16 +225,20 @@ void widen_leaves(collide_world *world)
     look_at_sides(world);
 }
 
-/* Give n bodies' leaves their boxes with room for margins; -1 where a box has no end any more, or has one now. */
-static int64_t move_widened(collide_world *world, const int64_t *bodies, int64_t n)
+/* Give n bodies' leaves their boxes with room for margins, and leave these bodies in `bodies`: how many, or -1 where a box has no end
+   any more, or has one now. */
+static int64_t move_widened(collide_world *world, int64_t *bodies, int64_t n)
 {
-    int64_t k;
+    int64_t k, n_leaves = 0;
     for (k = 0; k < n; k++) {
-        widen_box(world, bodies[k]);
-        if (is_bounded(world, bodies[k]) != (world->leaf_of[bodies[k]] >= 0)) return -1;
-        if (world->leaf_of[bodies[k]] >= 0) put_leaf(world, bodies[k]);
+        int64_t body = bodies[k], has_leaf = world->leaf_of[body] >= 0;
+        widen_box(world, body);
+        if (is_bounded(world, body) != has_leaf) return -1;
+        if (!has_leaf) continue;
+        put_leaf(world, body);
+        bodies[n_leaves++] = body;
     }
-    return n;
+    return n_leaves;
 }
 
 void move_flagged(collide_world *world, int with_tree)

@@ -315,13 +315,27 @@ def test_margins_of_bodies_and_pairs_have_pythons_bits(first):
     assert not few, (few, tally)
 
 
-def test_a_world_in_motion_has_pythons_bits():
-    """So many bodies that trees are of several parts, fitted along paths and made anew; all move, or a few."""
+@pytest.mark.parametrize("with_margins", [False, True])
+def test_a_world_in_motion_has_pythons_bits(with_margins):
+    """So many bodies that trees are of several parts, fitted along paths and made anew; all move, or a few. With
+    margins a half-space moves among them, which has no leaf in a tree."""
     python, own, _ = scattered(400)
-    random, ids = np.random.default_rng(94), np.array(python.ids)
+    random = np.random.default_rng(94)
+    if with_margins:
+        slope = collide.Halfspace((0.1, 0, 1), -3.0)
+        slope_in_c = c.CShape(slope)
+        assert own.add(slope_in_c, np.eye(4))[1] == python.add(slope)
+    ids = np.array(python.ids)
     X_WBs, n_hits = np.stack([python.body(k).X_WB for k in python.ids]), 0
     for step in range(24):
+        if with_margins and step % 6 == 0:
+            margined, margins = random.choice(ids, 9, replace=False), random.choice([0.0, 0.01, 0.3, 3.0], 9)
+            for body, margin in zip(margined.tolist(), margins.tolist()):
+                python.set_margin(body, margin)
+            assert own.set_margins(margined, margins) == c.OK
         some = ids if step % 3 == 0 else random.choice(ids, 20, replace=False)
+        if with_margins:
+            some = np.union1d(some, ids[-1:])
         far = 10.0 if step % 8 == 7 else 0.02
         X_WBs[some, :3, 3] += random.normal(size=(len(some), 3)) * far
         python.set_poses(some, X_WBs[some])
