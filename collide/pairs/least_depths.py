@@ -19,6 +19,7 @@ from collide.shapes.shape import Shape
 
 #: Loaded when a least depth is first asked for.
 of_unions = lazy_module("collide.narrowphase.composite.least_depth")
+of_mesh_unions = lazy_module("collide.narrowphase.composite.least_mesh_depth")
 of_facets = lazy_module("collide.narrowphase.facets.least_facet_depth")
 #: How depths of bodies that are not convex are searched.
 DepthSearch = Literal["quick", "least"]
@@ -37,8 +38,11 @@ def shorten_depths(rows: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray) -
     `distance`."""
     for k in np.flatnonzero((rows["upper"] <= 0.0) & (rows["lower"] < 0.0) & np.isfinite(rows["lower"])).tolist():
         shapes = shape_at(A, k), shape_at(B, k)
-        if method_of(*map(kind_of, shapes)) is Method.FACETS:
+        method = method_of(*map(kind_of, shapes))
+        if method is Method.FACETS:
             search = of_facets
+        elif method in (Method.CURVED, Method.MESH_PARTS):
+            search = of_mesh_unions
         elif not any(shape.meshed for shape in shapes) and not all(map(is_single_convex, shapes)):
             search = of_unions
         else:

@@ -568,7 +568,13 @@ def _separating_translation(
 def _shortened(A: CompoundParts, B: CompoundParts, X_WA, X_WB, known, directions, meeting) -> SeparatingTranslation:
     """`shortened` of two unions; the translations of their parts' rows are tried first."""
     more = [-float(row["distance"]) * row["normal"] for row in meeting if -math.inf < row["distance"] < 0.0]
-    return shortened(lambda X, Y: _states(A, B, X, Y) != APART, X_WA, X_WB, known, directions, more)
+    return shortened(meets(A, B), X_WA, X_WB, known, directions, more)
+
+
+def meets(A: CompoundParts, B: CompoundParts) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+    """(poses of A, poses of B), each (n, 4, 4), → (n,) bool, False only where the bodies are proven apart: for searches
+    of translations."""
+    return lambda X_WA, X_WB: _states(A, B, X_WA, X_WB) != APART
 
 
 #: How far a way out of half-spaces is followed, in sizes of the pair without them.
@@ -615,13 +621,19 @@ def _across_all(normals: np.ndarray) -> np.ndarray:
 
 def _planes(A: CompoundParts, B: CompoundParts, X_WA, X_WB) -> tuple[np.ndarray, np.ndarray]:
     """((k, 3) outward normals of the half-spaces of A, (k,) how deep B reaches into each [m]), but for rounding."""
+    normals, offsets = planes_of(A, X_WA)
+    return normals, offsets + B.extents(X_WB, -normals)[0]
+
+
+def planes_of(A: CompoundParts, X_WA: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """((k, 3) outward normals of the half-spaces of A in the world, (k,) offsets of their planes [m]), but for
+    rounding."""
     which = np.flatnonzero(~np.isnan(A.columns.plane))
     X = A.placed(which, np.broadcast_to(X_WA, (len(which), 4, 4)), np.zeros(len(which))).X
     planes = np.array([A.parts[k].bound.params[:4] for k in which.tolist()])
     lengths = np.sqrt(np.square(planes[:, :3]).sum(axis=1))
     normals = np.einsum("kij,kj->ki", X[:, :3, :3], planes[:, :3]) / lengths[:, None]
-    offsets = planes[:, 3] / lengths + (normals * X[:, :3, 3]).sum(axis=1)
-    return normals, offsets + B.extents(X_WB, -normals)[0]
+    return normals, planes[:, 3] / lengths + (normals * X[:, :3, 3]).sum(axis=1)
 
 
 def _shortest_way(normals: np.ndarray, depths: np.ndarray) -> np.ndarray | None:

@@ -1,13 +1,13 @@
 """The least translation that parts two overlapping unions of convex parts, between two proven bounds.
 
-B moved by x meets A where x lies in A ⊖ B of a pair of parts, a convex set K. The depth is the distance from 0 to the
-nearest point outside of all K. Directions are cut into cones of three rays from 0. A cone is covered up to a triangle
-with a corner on each ray where a K holds 0 and the three corners; and from a covered triangle to a farther triangle
-where a K holds the corners of both: K is convex, and each ray of the cone runs from triangle to triangle within their
-hull. So every x in the cone nearer to 0 than the last triangle leaves the bodies together, and the nearest of all last
-triangles is a lower bound of the depth. Cones with near triangles are cut in four, until all triangles are as far as
-the shortest translation known, but for a part. Shorter translations are looked for from the rays on
-(`shorter_ways.py`).
+B moved by x meets A where x lies in A ⊖ B of a pair of parts, a convex set K, without end where a part is a half-space.
+The depth is the distance from 0 to the nearest point outside of all K. Directions are cut into cones of three rays from
+0. A cone is covered up to a triangle with a corner on each ray where a K holds 0 and the three corners; and from a
+covered triangle to a farther triangle where a K holds the corners of both: K is convex, and each ray of the cone runs
+from triangle to triangle within their hull. So every x in the cone nearer to 0 than the last triangle leaves the bodies
+together, and the nearest of all last triangles is a lower bound of the depth. Cones with near triangles are cut in
+four, until all triangles are as far as the shortest translation known, but for a part. Shorter translations are looked
+for from the rays on (`shorter_ways.py`).
 
 Where K begins and ends along a ray is worked out in doubles, as a proposal. The narrowphase is asked about all corners
 at the moved poses: booleans, certain, with the rounding of the moved pose in them. Rays of the cones asked about stand
@@ -49,7 +49,8 @@ _NARROWEST = 2.0**-24
 
 
 def least_depth(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, known: Depth) -> Depth:
-    """The depth of two overlapping bodies of bounded convex parts at poses (4, 4), no worse than a known one."""
+    """The depth of two overlapping bodies of convex parts at poses (4, 4), no worse than a known depth: the known depth
+    itself where both bodies have half-spaces, since two half-spaces overlap without end."""
     pairs = _Pairs(A, B, X_WA, X_WB, known)
     return known if pairs.unbounded or not known.least < known.proven * (1.0 - TOLERANCE) else pairs.searched(known)
 
@@ -66,7 +67,7 @@ class _Pairs:
         sides = parts_of(A), parts_of(B)
         packed = [part for side in sides for part, _ in side]
         self.n_a, self.n_b, self.X_WB = len(sides[0]), len(sides[1]), X_WB
-        self.unbounded = any(part.kind == HALFSPACE for part in packed)
+        self.unbounded = all(any(part.kind == HALFSPACE for part, _ in side) for side in sides)
         self.table = ShapeTable(packed)
         self.table.build_trees(np.arange(len(packed)))
         self.X_BP = np.array([X for side in sides for _, X in side])

@@ -16,7 +16,8 @@ import numpy as np
 
 from collide.base.poses_at import poses_at
 from collide.kernels import address_of
-from collide.lowering.facet_bodies import Body, body_of, origin_body
+from collide.lowering.enclosures import enclosure_of
+from collide.lowering.facet_bodies import Body, body_of, has_facets, is_halfspace, origin_body
 from collide.narrowphase.facets.balls_within_balls import within_balls
 from collide.narrowphase.facets.facet_queries import points_in_solid, surface_distances
 from collide.narrowphase.facets.winding_numbers import INSIDE, ON_SURFACE
@@ -28,15 +29,21 @@ _GRID, _FACETS, _BENEATH, _MAX_BALLS, _OUT, _VERTICES = 20, 700, (0.003, 0.01, 0
 #: The smallest cubes, as a part of the shortest translation known; cubes looked at in all, and at once.
 _SMALLEST, _CUBES, _AT_ONCE = 2.0**-7, 60_000, 512
 
+_NO_BALLS = np.zeros((0, 4))
+
 
 @kept_with_shape("_inner_balls")
 def inner_balls(shape: Shape) -> np.ndarray:
-    """(k, 4) centres in the shape's frame and radii, proven, of balls within a solid; its vertices among them.
+    """(k, 4) centres in the shape's frame and radii, proven, of balls within a shape's core, or, of a curved shape, the
+    polytope within; vertices among them, and of surfaces, segments and points no other.
 
-    Some thousand points are asked for their distance to the surface, once a shape.
+    Some thousand points of a solid are asked for their distance to the surface, once a shape.
     """
-    body = body_of(shape)
+    body = body_within(shape)
+    assert body is not None
     corners = body.tree.triangles.reshape(-1, 3, 3)
+    if not body.solid:
+        return _points_of_facets(corners)
     vertices = np.unique(corners.reshape(-1, 3), axis=0)
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     steps = (np.arange(_GRID) + 0.5) / _GRID
@@ -58,6 +65,23 @@ def inner_balls(shape: Shape) -> np.ndarray:
     ends = vertices[(vertices @ directions(_VERTICES // 2).T).argmax(axis=0)]
     points = np.unique(np.concatenate([ends, vertices[:: 2 * len(vertices) // _VERTICES + 1]]), axis=0)
     return np.concatenate([np.array(inner).reshape(-1, 4), np.column_stack([points, np.zeros(len(points))])])
+
+
+def _points_of_facets(corners: np.ndarray) -> np.ndarray:
+    """(k, 4) corners and points of edges of facets (m, 3, 3), as balls of radius 0; of many facets some."""
+    corners = corners[:: len(corners) // _VERTICES + 1]
+    t = np.linspace(0.0, 1.0, max(2, min(_GRID, _MAX_BALLS // (3 * len(corners)))), endpoint=False)[:, None, None]
+    ends = [corners[:, [k]] + t[:, :, None] * (corners[:, [k - 1]] - corners[:, [k]]) for k in range(3)]
+    points = np.unique(np.concatenate(ends).reshape(-1, 3), axis=0)
+    return np.column_stack([points, np.zeros(len(points))])
+
+
+def body_within(shape: Shape) -> Body | None:
+    """The body of facets of a shape, or within a curved shape; ``None`` of half-spaces, and where no polytope is
+    found."""
+    if is_halfspace(shape):
+        return None
+    return body_of(shape) if has_facets(shape) else enclosure_of(shape).inner
 
 
 def distances_within(body: Body, X: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -84,20 +108,32 @@ def directions(n: int) -> np.ndarray:
     return np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)
 
 
-def depth_of_balls(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, known: float) -> float:
+def depth_of_solids(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, known: float) -> float:
     """A proven lower bound [m] of the depth of two solids at poses (4, 4), no more than a known length."""
-    a, b = (_balls_at(inner_balls(shape), X) for shape, X in ((A, X_WA), (B, X_WB)))
+    a, b = (balls_at(inner_balls(shape), X) for shape, X in ((A, X_WA), (B, X_WB)))
+    b[:, 3] += body_of(A).radius + body_of(B).radius
+    return depth_of_balls(a, b, float(np.abs(X_WA[:3, 3]).max() + np.abs(X_WB[:3, 3]).max()), known)
+
+
+def depth_of_balls(a: np.ndarray, b: np.ndarray, size: float, known: float, more: np.ndarray = _NO_BALLS) -> float:
+    """A proven lower bound [m] of the depth of bodies, by balls (k, 4) within A and (m, 4) within B; a known length at
+    most.
+
+    size : the largest shift of the poses of the balls [m].   more : (j, 4) balls of translations of B, all of which
+    leave the bodies together.
+    """
     centres = (a[:, None, :3] - b[None, :, :3]).reshape(-1, 3)
-    radii = (a[:, None, 3] + b[None, :, 3]).reshape(-1) + (body_of(A).radius + body_of(B).radius)
+    radii = (a[:, None, 3] + b[None, :, 3]).reshape(-1)
     # B moved by x: |a − (b + x)| < r + s, so x is within the sum of a − b; rounding is within 2⁻⁴⁵ of the size.
-    radii -= 2.0**-45 * (np.abs(centres).max() + np.abs(X_WA[:3, 3]).max() + np.abs(X_WB[:3, 3]).max())
+    centres, radii = np.concatenate([centres, more[:, :3]]), np.concatenate([radii, more[:, 3]])
+    radii -= 2.0**-45 * (size + sum(np.abs(of[:, :3]).max(initial=0.0) for of in (a, b, centres)))
     reach = np.sqrt(np.square(centres).sum(axis=1)) - radii
     some = np.flatnonzero((reach < known) & (radii > _SMALLEST * known))
     some = some[np.argsort(-radii[some], kind="stable")]
     return _covered(np.ascontiguousarray(np.column_stack([centres, radii])[some]), known) if len(some) else 0.0
 
 
-def _balls_at(balls: np.ndarray, X: np.ndarray) -> np.ndarray:
+def balls_at(balls: np.ndarray, X: np.ndarray) -> np.ndarray:
     """Balls in the world: a matrix shrinks a ball by no more than the least of its stretches."""
     least = float(np.linalg.svd(X[:3, :3], compute_uv=False).min()) * (1.0 - 2.0**-40)
     return np.column_stack([balls[:, :3] @ X[:3, :3].T + X[:3, 3], balls[:, 3] * min(least, 1.0)])

@@ -16,7 +16,7 @@ import numpy as np
 
 from collide.lowering.facet_bodies import Body, body_of
 from collide.narrowphase.facets.facet_kernel_calls import hits
-from collide.narrowphase.facets.inner_balls import depth_of_balls, directions, distances_within
+from collide.narrowphase.facets.inner_balls import depth_of_solids, directions, distances_within
 from collide.narrowphase.facets.separating_translation import length_of_step, shortest_separating
 from collide.narrowphase.known_depth import Depth
 from collide.shapes.shape import Shape
@@ -47,10 +47,10 @@ def least_depth(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, known: D
 def _least(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray, known: Depth) -> Depth:
     least = known.least
     if A.solid and B.solid:
-        least = min(max(least, _largest_sum(A, B, X_WA, X_WB)), known.proven)
-    known = _shortened(lambda X, Y: hits(A, B, X, Y), X_WA, X_WB, known._replace(least=least))
+        least = min(max(least, largest_sum(A, B, X_WA, X_WB)), known.proven)
+    known = shorter_depth(lambda X, Y: hits(A, B, X, Y), X_WA, X_WB, known._replace(least=least))
     if A.solid and B.solid and known.least * _NARROW < known.proven:
-        least = depth_of_balls(A.shape, B.shape, X_WA, X_WB, known.proven)
+        least = depth_of_solids(A.shape, B.shape, X_WA, X_WB, known.proven)
         known = known._replace(least=min(max(known.least, least), known.proven))
     return known
 
@@ -58,7 +58,7 @@ def _least(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray, known: Depth) -
 # --- from below ---------------------------------------------------------------------------------
 
 
-def _largest_sum(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray) -> float:
+def largest_sum(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray) -> float:
     """The largest sum found of the distances [m] to both surfaces from a point in both solids, with the radii; 0 where
     no point is found."""
     corners = [_corners(body, X) for body, X in ((A, X_WA), (B, X_WB))]
@@ -99,7 +99,7 @@ def _sums(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray, points: np.ndarr
 # --- from above ---------------------------------------------------------------------------------
 
 
-def _shortened(meet: Callable, X_WA: np.ndarray, X_WB: np.ndarray, known: Depth) -> Depth:
+def shorter_depth(meet: Callable, X_WA: np.ndarray, X_WB: np.ndarray, known: Depth) -> Depth:
     """A depth no longer than a known one."""
     best = known
 
