@@ -6,12 +6,13 @@ bodies is a choice among its cells. Facets without meeting facets are taken whol
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from collide.narrowphase.facets.facet_queries import all_hits, self_hits
+from collide.narrowphase.facets.facet_queries import all_hits, steady_facets
 from collide.shapes.shape import kept_with_shape
 from collide.solids.around_edges import Sheets
 from collide.solids.cells import Cells, cells_of, merged_sheets
@@ -23,6 +24,9 @@ from collide.solids.limits import BYTES_PER_PAIR, UNLIMITED, Limits
 from collide.solids.placed_facets import Operand, PlacedFacets
 from collide.solids.split_facets import split_facets
 from collide.solids.sweep_triangulation import triangulate
+
+#: The margin of steady facets, in units of a mesh's tree: rounding moves vertices by less, but for meshes far away.
+_STEADY = 2.0**-48
 
 
 class Arrangement(NamedTuple):
@@ -136,10 +140,29 @@ def meeting_pairs(facets: PlacedFacets) -> np.ndarray:
     return pairs[(pairs >= 0).all(axis=1)]
 
 
+class Steadiness(NamedTuple):
+    """Crossings of a mesh's facets, with vertices in place and with vertices moved a little.
+
+    crossings : (k, 2) pairs of crossing facets.
+    is_steady : (n,) bool, facets of which no two cross either where vertices are moved by the margin along each axis.
+    margin : [m], in the frame of the mesh.
+    """
+
+    crossings: np.ndarray
+    is_steady: np.ndarray
+    margin: float
+
+
 @kept_with_shape("_crossings")
+def steadiness_of(mesh) -> Steadiness:
+    """The crossings of a mesh, and its steady facets: in the time of the crossings."""
+    margin = _STEADY * math.ldexp(1.0, mesh.tree.exponent)
+    return Steadiness(*steady_facets(mesh.tree, margin), margin)
+
+
 def crossings_of(mesh) -> np.ndarray:
     """(k, 2) facets of a mesh that cross each other."""
-    return self_hits(mesh.tree)[0]
+    return steadiness_of(mesh).crossings
 
 
 def cut_facet(cuts: FacetCuts, f: int) -> list[tuple[int, int, int]]:

@@ -1,6 +1,7 @@
 """The solid of an arrangement's triangles in doubles, without crossing facets and without flat facets.
 
-Points are rounded and facets merged (`facet_merging.py`); then all facets are asked exactly whether they cross. While
+Points are rounded and facets merged (`facet_merging.py`); then facets are asked exactly whether they cross, but for
+those that rounding leaves as far apart as they were (`rounded_crossings.py`). While
 some do, near features are joined as well (`near_features.py`), with twice the reach in every further round. After
 `_ROUNDS` rounds the work ends, and the remaining crossings are told.
 """
@@ -12,10 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.kernels import address_of
-from collide.solids.arrangement import Arrangement, crossings_of
+from collide.solids.arrangement import Arrangement
 from collide.solids.closed_surface import N_VERTICES, SurfaceArrays
 from collide.solids.facet_merging import merge_flat_facets
 from collide.solids.placed_facets import PlacedFacets
+from collide.solids.rounded_crossings import rounded_crossings, shaken_facets
 from collide.solids.rounded_mesh import RoundedMesh, solid_of_facets, used_points, welded
 from collide.solids.rounded_points import rounded_points, rounded_vertices
 
@@ -44,12 +46,22 @@ def clean_mesh(arrangement: Arrangement, triangles: np.ndarray, rows: np.ndarray
     faces, proper = welded(vertices, faces)
     unit = np.spacing(np.abs(vertices).max(initial=0.0))
     movable = np.zeros(len(ids), dtype=bool)
-    movable[faces[rows >= len(arrangement.facets.corners) - arrangement.n_cut]] = True
+    is_cut = rows >= len(arrangement.facets.corners) - arrangement.n_cut
+    movable[faces[is_cut]] = True
+    shaken = shaken_facets(arrangement, unit, len(faces))
+    if shaken is not None:
+        shaken = shaken[arrangement.sheets.facet[rows]] | is_cut
     for attempt in range(_ROUNDS):
         reach = REACH * 2.0 ** max(attempt - 1, 0) * unit
         made = _merged(vertices, faces[proper], proper, sources, movable, reach, attempt > 0)
         mesh, remaining, n_thin = solid_of_facets(made.vertices, made.corners)
-        crossing = crossings_of(mesh) if mesh is not None else np.zeros((0, 2), dtype=np.int64)
+        if mesh is None:
+            break
+        asked = None
+        if shaken is not None:
+            source = made.sources[remaining]
+            asked = shaken[source] | (made.corners[remaining] != faces[source]).any(axis=1)
+        crossing = rounded_crossings(mesh, asked)
         if not len(crossing):
             break
         corners = made.corners[remaining[crossing]]

@@ -7,6 +7,7 @@ addresses, takes longer than most booleans.
 
 from __future__ import annotations
 
+import math
 import threading
 from typing import NamedTuple
 
@@ -14,7 +15,7 @@ import numpy as np
 
 from collide.errors import InvalidPose
 from collide.kernels import address_of, code_of
-from collide.mesh.bvh import WIDTH, MeshTree
+from collide.mesh.bvh import RADIUS, WIDTH, MeshTree
 from collide.mesh.bvh_slabs import make_slabs
 from collide.narrowphase.facets import facets_within as near_pairs
 from collide.narrowphase.facets import ray_surface as rays
@@ -256,6 +257,23 @@ def self_hits(tree: MeshTree) -> tuple[np.ndarray, np.ndarray]:
     Decided exactly on the coordinates given; corners are common where their coordinates are equal. Two facets with the
     same three corners are among the pairs.
     """
+    return _self_hits(tree, 0.0, np.zeros(1, dtype=np.uint8))
+
+
+def steady_facets(tree: MeshTree, margin: float) -> tuple[np.ndarray, np.ndarray]:
+    """((k, 2) pairs as of `self_hits`, (n,) bool: steady facets, in the time of the pairs).
+
+    Steady facets share nothing more with each other either when all corners are moved by no more than the margin [m]
+    along each axis, equal corners alike. No facet is steady in trees with origins and for margins over 2⁻⁴⁰ of the size
+    of the tree.
+    """
+    is_steady = np.zeros(len(tree.ids), dtype=np.uint8)
+    fits = 0.0 < margin <= 2.0**-40 * min(tree.numbers[RADIUS], math.ldexp(1.0, tree.exponent))
+    return _self_hits(tree, float(margin) if fits else 0.0, is_steady)[0], is_steady.view(bool)
+
+
+def _self_hits(tree: MeshTree, margin: float, is_steady: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """As `self_hits`.   is_steady : out, per facet, for a margin above 0."""
     keys = np.empty(4096, dtype=np.int64)
     counters, progress = np.zeros(3, dtype=np.int64), np.zeros(2, dtype=np.int64)
     planes = np.empty(self_contact.PLANE * len(tree.ids))
@@ -263,7 +281,7 @@ def self_hits(tree: MeshTree) -> tuple[np.ndarray, np.ndarray]:
     while True:
         status = self_contact.walk_itself(
             tree.address, address_of(keys), len(keys), address_of(counters), address_of(progress), address_of(planes),
-            *work.addresses,
+            margin, address_of(is_steady), *work.addresses,
         )
         if status != self_contact.FULL:
             break

@@ -6,6 +6,9 @@ further common point leaves one of them first, over its edge opposite v. Facets 
 if they lie in one plane on the same side of the common edge. Facets with three are equal. Common corners are points,
 each counted once. A facet without area is the segment or the point spanned by its corners: a segment equal to an edge
 of a neighbour shares nothing more, a longer segment does.
+
+Asked with a *margin*, the walk also says which facets are steady: two steady facets share nothing more wherever all
+corners are moved by no more than the margin along each axis, equal corners alike.
 """
 
 from __future__ import annotations
@@ -15,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.kernels import entry, kernel, view_f64, view_i64
+from collide.kernels import entry, kernel, view_f64, view_i64, view_u8
 from collide.mesh.box_overlap import FRAME, PROBE, boxes_meeting
 from collide.mesh.bvh import EXPONENT, HAS_ORIGINS, N_FACETS, NODE, WIDTH, box_at, box_size, open_tree, origin_of
 from collide.mesh.triangle import Triangle, normal_of, put_triangle, triangle_at
@@ -51,13 +54,16 @@ class _Query(NamedTuple):
     """A tree as both of a pair, unmoved.
 
     planes : PLANE doubles a facet.   unit, slack : the unit of the boxes, and by how much facets leave them.
-    pairs : out, room for ``capacity`` facet pairs.   progress, counters : as above.
+    margin : how far corners may be moved along each axis, 0 where that is not asked.   is_steady : out, a facet, by
+    number.   pairs : out, room for ``capacity`` facet pairs.   progress, counters : as above.
     """
 
     trees: PosedTrees
     planes: np.ndarray
     unit: float
     slack: float
+    margin: float
+    is_steady: np.ndarray
     pairs: np.ndarray
     capacity: int
     progress: np.ndarray
@@ -239,12 +245,13 @@ def _coincide(p, q):
 
 
 @kernel(inline=True)
-def _off_plane(points, planes, face, facet, reach):
+def _off_plane(points, planes, face, facet, reach, margin):
     """Whether a facet has corners besides a face's, all certainly on one side of the face's plane.
 
     Then the facet meets the plane only in the common corners and the points between them. Coordinates are exact, so
     with edges up to L a side at distance w is off by 64 u L² w, as in `filtered_triangles.py`. reach : bound of all w
-    along every axis.
+    along every axis, D, and of L. Corners moved by a margin ε ≤ L / 64 change edges and w by 2ε, normals by 8.2 Lε and
+    sides by 3 (2L² 2ε + 8.2 Lε (D + 2ε)) < 64 εD².
     """
     of_face = triangle_at(points, 9 * face)
     facet_b = triangle_at(points, 9 * facet)
@@ -252,7 +259,7 @@ def _off_plane(points, planes, face, facet, reach):
     p = dot(n, sub(facet_b.p, of_face.p))
     q = dot(n, sub(facet_b.q, of_face.p))
     r = dot(n, sub(facet_b.r, of_face.p))
-    limit = planes[PLANE * face + 3] * reach * 2.0**-47 + TINY
+    limit = planes[PLANE * face + 3] * reach * 2.0**-47 + TINY + 64.0 * margin * reach * reach
     above = (p > limit) | (q > limit) | (r > limit)
     below = (p < -limit) | (q < -limit) | (r < -limit)
     return (
@@ -264,15 +271,16 @@ def _off_plane(points, planes, face, facet, reach):
 
 
 @kernel
-def _beyond_a_side(points, planes, face, facet, reach):
+def _beyond_a_side(points, planes, face, facet, reach, margin):
     """Whether, seen along a face's normal, a facet's corners are certainly beyond some side of the face, or its ends.
 
     Facets around a vertex of a smooth surface are so. The wall on a side holds nothing of the face but the side, and of
-    the facet its common corners with the side. Sides of points at distance w: 256 u L³ w.
+    the facet its common corners with the side. Sides of points at distance w: 256 u L³ w. Corners moved by a margin
+    ε as in `_off_plane` change the wall's normal, at most 4L³, by 25 L²ε and sides by less than 128 L²εD.
     """
     n = vec3_at(planes, PLANE * face)
     square = planes[PLANE * face + 3]
-    limit = square * math.sqrt(square) * reach * 2.0**-44 + TINY
+    limit = square * math.sqrt(square) * reach * 2.0**-44 + TINY + 128.0 * margin * square * reach
     for k in range(3):
         start = vec3_at(points, 9 * face + 3 * k)
         end = vec3_at(points, 9 * face + 3 * ((k + 1) % 3))
@@ -288,6 +296,29 @@ def _beyond_a_side(points, planes, face, facet, reach):
         if beyond & proper:
             return True
     return False
+
+
+@kernel
+def _stay_apart(points, a, b, margin):
+    """Whether two facets certainly share no more than a corner, all corners moved by a margin.
+
+    By edges: opposite a common corner, all edges without. `sign_error` is of four corners off by E, as here.
+    """
+    count, i, j = _common_corners(points, a, b)
+    if count > 1:
+        return False
+    for k in range(3):
+        onward = 3 * ((k + 1) % 3)
+        if (count == 0 or k == (i + 1) % 3) and not _edge_is_apart(points, a + 3 * k, a + onward, b, margin):
+            return False
+        if (count == 0 or k == (j + 1) % 3) and not _edge_is_apart(points, b + 3 * k, b + onward, a, margin):
+            return False
+    return True
+
+
+@kernel
+def _edge_is_apart(points, p, q, facet, margin):
+    return segment_against_triangle(points, facet, points, p, q, margin)[0] == APART
 
 
 # --- the traversal ------------------------------------------------------------------------------
@@ -312,10 +343,16 @@ def _visit_leaves(query, pair):
         for j in range(i + 1 if pair.a == pair.b else 0, run_b & 7):
             b = (run_b >> 3) + j
             query.counters[TRIANGLES] += 1
-            if _off_plane(points, planes, a, b, reach):
+            margin = query.margin
+            if _off_plane(points, planes, a, b, reach, margin) or _off_plane(points, planes, b, a, reach, margin):
                 continue
-            if _off_plane(points, planes, b, a, reach) or _beyond_a_side(points, planes, a, b, reach):
+            if _beyond_a_side(points, planes, a, b, reach, margin):
                 continue
+            if margin > 0.0:
+                if _beyond_a_side(points, planes, b, a, reach, margin) or _stay_apart(points, 9 * a, 9 * b, margin):
+                    continue
+                query.is_steady[tree.ids[a]] = 0
+                query.is_steady[tree.ids[b]] = 0
             if _conflict(query, 9 * a, 9 * b):
                 smaller = int(min(tree.ids[a], tree.ids[b]))
                 larger = int(max(tree.ids[a], tree.ids[b]))
@@ -372,15 +409,26 @@ def _keep_own_axes_only(frame, probe):
         probe[k] = np.float32(1.0)
 
 
-@entry("int64(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)")
+@kernel
+def _set_steady(tree, planes, margin, is_steady):
+    """Start with all facets whose longest edge is over 64 margins; without facets in trees with origins."""
+    for facet in range(tree.header[N_FACETS]):
+        is_long = planes[PLANE * facet + 3] > 4096.0 * margin * margin
+        is_steady[tree.ids[facet]] = 1 if is_long and tree.header[HAS_ORIGINS] == 0 else 0
+
+
+@entry("int64(int64, int64, int64, int64, int64, int64, float64, int64, int64, int64, int64, int64, int64)")
 def walk_itself(
-    header_at, pairs_at, capacity, counters_at, progress_at, planes_at, stack_at, n_stack, doubles_at, integers_at,
-    exact_at
+    header_at, pairs_at, capacity, counters_at, progress_at, planes_at, margin, steady_at, stack_at, n_stack,
+    doubles_at, integers_at, exact_at
 ):
     """Pairs of facets of a surface that share more than corners and edges; DONE or FULL, then to be called again.
 
     Arguments are flat, as of all entries.
     planes : room for PLANE doubles a facet, kept between calls.
+    margin : 0, or at most 2⁻⁴⁰ of the unit of boxes and of the tree's size; boxes apart are so by 2⁻²⁰ of the unit:
+    half lengths are enlarged by more than comparisons in floats round.   steady : out, uint8, by facet number, for a
+    margin above 0.
     pairs : out, the smaller facet number times the number of facets plus the larger.
     """
     tree = open_tree(header_at)
@@ -399,11 +447,13 @@ def walk_itself(
     rounding = vec3_at(trees.placing, FRAMES + 12)
     query = _Query(
         trees, planes, math.ldexp(1.0, int(tree.header[EXPONENT])),
-        2.0**-16 + 2.0 * max(rounding.x, rounding.y, rounding.z),
+        2.0**-16 + 2.0 * max(rounding.x, rounding.y, rounding.z), margin, view_u8(steady_at, n_facets),
         view_i64(pairs_at, capacity), capacity, progress, view_i64(counters_at, 3),
     )
     if progress[TOP] == 0:
         _set_planes(tree.triangles, n_facets, planes)
+        if margin > 0.0:
+            _set_steady(tree, planes, margin, query.is_steady)
         stack[0] = 0
         progress[TOP] = 1
     progress[TOP] = -_traverse(query, stack, progress[TOP])
