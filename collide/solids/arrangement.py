@@ -16,7 +16,7 @@ from collide.narrowphase.facets.facet_queries import all_hits, steady_facets
 from collide.shapes.shape import kept_with_shape
 from collide.solids.around_edges import Sheets
 from collide.solids.cells import Cells, cells_of, merged_sheets
-from collide.solids.crossing_pairs import crossing_pairs
+from collide.solids.crossing_pairs import NO_CROSSINGS, crossing_pairs
 from collide.solids.cut_points import CutPoints, axis_of
 from collide.solids.cut_segments import cut_segments
 from collide.solids.facet_cuts import FacetCuts, segment
@@ -75,14 +75,16 @@ def arrange(operands: list[Operand], limits: Limits = UNLIMITED) -> Arrangement:
     unclear = pairs[~is_clear]
     n_exact = len(unclear) + int(exactly[crossings.pairs].any(axis=1).sum())
     limits.check_memory(BYTES_PER_PAIR * n_exact, f"{n_exact:,} pairs of facets to be cut exactly")
-    cuts = FacetCuts(facets, points, unclear, segments, np.flatnonzero(exactly), limits)
-    pieces, of = [], []
-    for f in limits.watched("cutting facets", sorted(cuts.corners_of)):
-        made = cut_facet(cuts, f)
-        pieces += made
-        of += [f] * len(made)
+    pieces: list[tuple[int, int, int]] = []
+    of: list[int] = []
     is_cut = by_paths
-    is_cut[list(cuts.corners_of)] = True
+    if exactly.any() or len(facets.thin):
+        cuts = FacetCuts(facets, points, unclear, segments, np.flatnonzero(exactly), limits)
+        for f in limits.watched("cutting facets", sorted(cuts.corners_of)):
+            made = cut_facet(cuts, f)
+            pieces += made
+            of += [f] * len(made)
+        is_cut[list(cuts.corners_of)] = True
     of_piece = np.array(of, dtype=np.int64)
     body = facets.body[of_piece]
     merged = merged_sheets(np.array(pieces, dtype=np.int64).reshape(-1, 3), of_piece, body, len(operands))
@@ -97,9 +99,11 @@ def _clear_crossings(facets: PlacedFacets, pairs: np.ndarray):
 
     Facets crossing their own body's, and their neighbours in such crossings, are cut exactly.
     """
+    exactly = np.zeros(len(facets.corners), dtype=bool)
+    if not len(pairs):
+        return NO_CROSSINGS, np.zeros(0, dtype=bool), exactly
     of_one = facets.body[pairs[:, 0]] == facets.body[pairs[:, 1]]
     crossings, proven = crossing_pairs(facets, pairs[~of_one])
-    exactly = np.zeros(len(facets.corners), dtype=bool)
     exactly[pairs[of_one]] = True
     exactly[pairs[exactly[pairs].any(axis=1)]] = True
     exactly[pairs[~of_one][~proven]] = True

@@ -160,7 +160,10 @@ def solid_of(arrangement: Arrangement, keep: np.ndarray, rounding: str) -> Boole
 
 def _classes(arrangement: Arrangement, rows: np.ndarray) -> np.ndarray:
     """(k,) int64: equal for sheets of a body with the same bodies on both sides."""
-    _, held = np.unique(arrangement.holds(), axis=0, return_inverse=True)
-    sides = np.sort(held.ravel()[arrangement.cells.sides[rows]], axis=1)
+    holds = arrangement.holds()
+    held = np.zeros(len(holds), dtype=np.int64)
+    for of_body in holds.T:
+        held = np.unique(2 * held + of_body, return_inverse=True)[1]
+    sides = np.sort(held[arrangement.cells.sides[rows]], axis=1)
     n = len(held)
     return (arrangement.facets.body[arrangement.sheets.facet[rows]] * n + sides[:, 0]) * n + sides[:, 1]

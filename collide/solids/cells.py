@@ -74,16 +74,18 @@ def cells_of(sheets: Sheets, points: CutPoints, is_cut: np.ndarray, crossings: n
     root = components(2 * n, 2 * patch[first // 2] + first % 2, 2 * patch[second // 2] + second % 2)
     cells, of_side = np.unique(root, return_inverse=True)
     of_patch = of_side.reshape(n, 2)
-    return Cells(of_patch[patch], _windings(sheets, first_sheet, of_patch, len(cells), points))
+    return Cells(of_patch[patch], _windings(sheets, patch, first_sheet, of_patch, len(cells), points))
 
 
 # --- winding numbers ----------------------------------------------------------------------------
 
 
 def _windings(
-    sheets: Sheets, first_sheet: np.ndarray, sides: np.ndarray, n_cells: int, points: CutPoints
+    sheets: Sheets, patch: np.ndarray, first_sheet: np.ndarray, sides: np.ndarray, n_cells: int, points: CutPoints
 ) -> np.ndarray:
-    """(cells, r) winding numbers.   first_sheet : (patches,) one of each.   sides : (patches, 2) its cells."""
+    """(cells, r) winding numbers.   patch : (k,) of each sheet.   first_sheet : (patches,).   sides : (patches, 2) the
+    cells of a patch.
+    """
     r = sheets.steps.shape[1]
     steps = sheets.steps[first_sheet]
     _, first, passage = np.unique(sides[:, 0] * n_cells + sides[:, 1], return_index=True, return_inverse=True)
@@ -95,9 +97,13 @@ def _windings(
         beyond[behind].append((before, -step))
     winding = np.zeros((n_cells, r), dtype=np.int64)
     known = np.zeros(n_cells, dtype=bool)
-    _, patch = np.unique(components(n_cells, *sides.T)[sides[:, 0]], return_index=True)
+    part = components(n_cells, *sides.T)[sides[:, 0]]
+    some, of_part = np.unique(part, return_index=True)
+    last_sheet = np.empty(n_cells, dtype=np.int64)
+    last_sheet[part[patch]] = np.arange(len(patch))
+    rows = np.stack([first_sheet[of_part], last_sheet[some]])
     stack = []
-    for cell, absolute in shoot(sheets, points, first_sheet[patch], sides[patch]):
+    for cell, absolute in shoot(sheets, points, rows, sides[patch[rows]]):
         winding[cell], known[cell] = absolute, True
         stack.append(cell)
     while stack:

@@ -14,12 +14,12 @@ import numpy as np
 
 from collide.kernels import address_of
 from collide.solids.arrangement import Arrangement
-from collide.solids.closed_surface import N_VERTICES, SurfaceArrays
+from collide.solids.closed_surface import N_VERTICES, PLANE, SurfaceArrays, write_planes
 from collide.solids.facet_merging import merge_flat_facets
 from collide.solids.placed_facets import PlacedFacets
 from collide.solids.rounded_crossings import rounded_crossings, shaken_facets
 from collide.solids.rounded_mesh import RoundedMesh, solid_of_facets, used_points, welded
-from collide.solids.rounded_points import rounded_points, rounded_vertices
+from collide.solids.rounded_points import near_points, rounded_points
 
 #: The reach of the first round, in units in the last place of the largest coordinate.
 REACH = 4.0
@@ -73,13 +73,13 @@ def clean_mesh(arrangement: Arrangement, triangles: np.ndarray, rows: np.ndarray
 def _sources_of(arrangement: Arrangement, triangles: np.ndarray, rows: np.ndarray, kind: np.ndarray) -> _Sources:
     facets: PlacedFacets = arrangement.facets
     turned = triangles[:, 0] != arrangement.sheets.triangles[rows, 0]
-    some, plane = np.unique(2 * arrangement.sheets.facet[rows] + turned, return_inverse=True)
-    ids, corners = used_points(facets.corners[some // 2], len(facets.local))
-    corners = rounded_vertices(facets, ids)[0][corners]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    size = np.sqrt((normals * normals).sum(axis=1)) * np.where(some % 2, -1.0, 1.0)
-    normals /= np.where(size != 0.0, size, 1.0)[:, None]
-    return _Sources(plane.ravel(), np.ascontiguousarray(kind), np.concatenate([corners[:, 0], normals], axis=1))
+    sides, plane = used_points(2 * arrangement.sheets.facet[rows] + turned, 2 * len(facets.corners))
+    place, planes = near_points(arrangement.points).place, np.empty((len(sides), PLANE))
+    write_planes(
+        address_of(place), len(place), address_of(facets.corners), len(facets.corners), address_of(sides), len(sides),
+        address_of(planes),
+    )
+    return _Sources(plane, kind, planes)
 
 
 class _Merged(NamedTuple):

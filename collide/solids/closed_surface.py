@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from collide.kernels import address_of, kernel, view_f64, view_i64
-from collide.numerics.vec3 import dot, norm, sub, vec3_at
+from collide.kernels import address_of, entry, kernel, view_f64, view_i64
+from collide.numerics.vec3 import cross, divide, dot, norm, put_vec3, sub, vec3_at
 
 #: Vertices with more triangles around are not taken away.
 MAX_RING = 64
@@ -119,6 +119,25 @@ def _filled(values, size: int, dtype) -> np.ndarray:
     made = np.empty(size, dtype=dtype)
     made[: values.size] = values.ravel()
     return made
+
+
+@entry("void(int64, int64, int64, int64, int64, int64, int64)")
+def write_planes(places_at, n, corners_at, n_facets, sides_at, k, planes_at):
+    """Planes of facets, a point and a unit normal each, in doubles; the normal 0 of facets without area.
+
+    places : (n, 3) vertices.   corners : (F, 3).   sides : (k,) 2 · facet, and 1 more for facets turned over.
+    planes : out, (k, PLANE).
+    """
+    places, corners = view_f64(places_at, 3 * n), view_i64(corners_at, 3 * n_facets)
+    sides, planes = view_i64(sides_at, k), view_f64(planes_at, PLANE * k)
+    for row in range(k):
+        at = 3 * (sides[row] >> 1)
+        p = vec3_at(places, 3 * corners[at])
+        q, r = vec3_at(places, 3 * corners[at + 1]), vec3_at(places, 3 * corners[at + 2])
+        normal = cross(sub(q, p), sub(r, p))
+        size = norm(normal) if sides[row] & 1 == 0 else -norm(normal)
+        put_vec3(planes, PLANE * row, p)
+        put_vec3(planes, PLANE * row + 3, divide(normal, size if size != 0.0 else 1.0))
 
 
 # --- corners and lists --------------------------------------------------------------------------

@@ -29,6 +29,11 @@ class CrossingPairs(NamedTuple):
     error: np.ndarray
 
 
+_NO_PAIRS = np.zeros((0, 2), dtype=np.int64)
+#: Without pairs.
+NO_CROSSINGS = CrossingPairs(_NO_PAIRS, _NO_PAIRS, _NO_PAIRS, np.zeros((0, 2, 3)), np.zeros(0))
+
+
 def crossing_pairs(facets: PlacedFacets, pairs: np.ndarray) -> tuple[CrossingPairs, np.ndarray]:
     """(the clearly crossing pairs, (k,) bool: given pairs among them)."""
     a, b = pairs.T

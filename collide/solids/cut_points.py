@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from functools import cmp_to_key
+from typing import Any
 
 import numpy as np
 
@@ -35,6 +36,8 @@ class CutPoints:
         self.same_as: dict[int, int] = {}
         self.pierced = np.zeros((0, 3), dtype=np.int64)
         self.crossed = np.zeros((0, 3), dtype=np.int64)
+        #: All points in doubles, once `rounded_points.near_points` was asked.
+        self.rounded: Any = None
         self._next = self.n_vertices
 
     def __len__(self) -> int:

@@ -47,6 +47,7 @@ class ExactFacets(PlacedFacets):
             none,
             np.zeros((2, 0), dtype=np.int32),
             np.zeros(0, dtype=np.int64),
+            np.zeros((0, 3), dtype=np.int64),
             grid,
         )
         self.operands = [cast(Operand, body)]

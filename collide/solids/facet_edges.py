@@ -21,6 +21,7 @@ class FacetEdges(NamedTuple):
     sides : (e, 2) the facets at an edge of two, else −1.
     links : (2, m) int32 the facets at edges of two.
     odd : half-edges 3 · facet + corner of all other edges.
+    thin : (k, 3) welded vertex ids of facets with distinct collinear corners.
     lowest_bit : exponent of the lowest bit set in any coordinate.
     """
 
@@ -31,6 +32,7 @@ class FacetEdges(NamedTuple):
     sides: np.ndarray
     links: np.ndarray
     odd: np.ndarray
+    thin: np.ndarray
     lowest_bit: int
 
 
@@ -39,6 +41,7 @@ def facet_edges(mesh: Mesh) -> FacetEdges:
     """The edges of a mesh's facets; O(n log n) when first asked for."""
     flags = mesh.survey.flags
     rows = np.flatnonzero((flags & (NO_AREA | COLLAPSED)) == 0)
+    thin = mesh.survey.corners[(flags & NO_AREA != 0) & (flags & COLLAPSED == 0)].astype(np.int64)
     place = np.full(len(flags), -1, dtype=np.int64)
     place[rows] = np.arange(len(rows))
     corners = mesh.survey.corners[rows].astype(np.int64)
@@ -56,4 +59,4 @@ def facet_edges(mesh: Mesh) -> FacetEdges:
     lowest = int(lowest_exponents(mesh.vertices.ravel()))
     links = np.ascontiguousarray(sides[sides[:, 0] >= 0].T.astype(np.int32))
     odd = np.flatnonzero(sides[edge, 0] < 0)
-    return FacetEdges(rows, place, corners, of_facet, sides, links, odd, lowest)
+    return FacetEdges(rows, place, corners, of_facet, sides, links, odd, thin, lowest)

@@ -15,8 +15,6 @@ import numpy as np
 
 from collide.lowering.facet_bodies import Body
 from collide.mesh.bvh import MeshTree
-from collide.mesh.mesh_survey import NO_AREA
-from collide.mesh.mesh_topology import COLLAPSED
 from collide.numerics.exact_points import Point, placed
 from collide.numerics.exact_vectors import cross, minus
 from collide.numerics.lowest_bits import NO_BITS, lowest_exponents
@@ -57,12 +55,18 @@ class PlacedFacets:
         self.number = np.concatenate([e.rows for e in self.edges])
         self.local = np.concatenate([operand.mesh.vertices for operand in operands])
         self.body_of = np.repeat(np.arange(len(operands)), np.diff(self.first_vertex))
-        thin = [_thin_corners(operand.mesh) + k for operand, k in zip(operands, self.first_vertex)]
-        self.thin = np.concatenate(thin)
-        self.grid = min(_grid_of(operand.X, edges) for operand, edges in zip(operands, self.edges))
-        self.origin = self._on_grid(*placed(operands[0].X, operands[0].mesh.vertices[:1]))[0]
+        self.thin = np.concatenate([e.thin + k for e, k in zip(self.edges, self.first_vertex)])
         self._exact: dict[int, Point] = {}
         self._normals: dict[int, Point] = {}
+
+    @cached_property
+    def grid(self) -> int:
+        return min(_grid_of(operand.X, edges) for operand, edges in zip(self.operands, self.edges))
+
+    @cached_property
+    def origin(self) -> Point:
+        first = self.operands[0]
+        return self._on_grid(*placed(first.X, first.mesh.vertices[:1]))[0]
 
     @cached_property
     def slack(self) -> float:
@@ -152,9 +156,3 @@ def _grid_of(X: np.ndarray, edges: FacetEdges) -> int:
     R, t = int(lowest_exponents(X[:3, :3].ravel())), int(lowest_exponents(X[:3, 3]))
     product = R + edges.lowest_bit if NO_BITS not in (R, edges.lowest_bit) else NO_BITS
     return min(product, t) if min(product, t) < NO_BITS else 0
-
-
-def _thin_corners(mesh: Mesh) -> np.ndarray:
-    """(k, 3) corners of facets with three corners on one line."""
-    flags = mesh.survey.flags
-    return mesh.survey.corners[(flags & NO_AREA != 0) & (flags & COLLAPSED == 0)].astype(np.int64)

@@ -18,23 +18,24 @@ _OPEN = 2
 
 
 def count_passages(
-    tree: MeshTree, X: np.ndarray, points: np.ndarray, axes: np.ndarray, slack: float
+    tree: MeshTree, X: np.ndarray, points: np.ndarray, axes: np.ndarray, skipped: np.ndarray, slack: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """((k,) int64 proven passages, (m, 2) rays and facets left open).
 
     X : (4, 4), the body's pose.   points : (k, 3) in W, origins of the rays.
-    axes : (k,) int64, 0, 1 or 2: the rays' axis, upwards.
+    axes : (k,) int64, 0, 1 or 2: the rays' axis, upwards.   skipped : (k,) int64, a facet left out for each ray, or −1.
     slack : bound of the errors of coordinates in W, of points and of vertices worked out in doubles, and of their
     differences. O(log n) a ray for well-shaped bodies.
     """
     X, points = np.ascontiguousarray(X), np.ascontiguousarray(points)
-    axes = np.ascontiguousarray(axes, dtype=np.int64)
+    axes, skipped = (np.ascontiguousarray(x, dtype=np.int64) for x in (axes, skipped))
     totals = np.empty(len(axes), dtype=np.int64)
     stack = np.empty(WIDTH * (tree.depth + 2), dtype=np.int64)
     remaining = np.empty((64 + 4 * len(axes), 2), dtype=np.int64)
     while True:
         count = pass_facets(
-            tree.address, address_of(X), address_of(points), address_of(axes), len(axes), float(slack),
+            tree.address, address_of(X), address_of(points), address_of(axes), address_of(skipped), len(axes),
+            float(slack),
             address_of(totals), address_of(remaining), len(remaining), address_of(stack), len(stack),
         )
         if count <= len(remaining):
@@ -108,9 +109,9 @@ def _passage(T, at, X, points, k, axis, slack):
     return 0 if height < -of_height else _OPEN
 
 
-@entry("int64(int64, int64, int64, int64, int64, float64, int64, int64, int64, int64, int64)")
+@entry("int64(int64, int64, int64, int64, int64, int64, float64, int64, int64, int64, int64, int64)")
 def pass_facets(
-    header_at, X_at, points_at, axes_at, n, slack, totals_at, left_at, capacity, stack_at, n_stack
+    header_at, X_at, points_at, axes_at, skipped_at, n, slack, totals_at, left_at, capacity, stack_at, n_stack
 ):
     """Returns the number of open pairs of rays and facets; ray and facet are written of the pairs within the capacity.
     totals : out, per ray.
@@ -118,7 +119,7 @@ def pass_facets(
     tree = open_tree(header_at)
     X = view_f64(X_at, 16)
     points = view_f64(points_at, 3 * n)
-    axes = view_i64(axes_at, n)
+    axes, skipped = view_i64(axes_at, n), view_i64(skipped_at, n)
     totals = view_i64(totals_at, n)
     remaining = view_i64(left_at, 2 * capacity)
     stack = view_i64(stack_at, n_stack)
@@ -140,6 +141,8 @@ def pass_facets(
                 continue
             run = ~link
             for a in range(run >> 3, (run >> 3) + (run & 7)):
+                if tree.ids[a] == skipped[k]:
+                    continue
                 passage = _passage(tree.triangles, 9 * a, X, points, k, axis, slack)
                 if passage != _OPEN:
                     totals[k] += passage

@@ -10,36 +10,80 @@ from collide.solids.around_edges import Sheets
 from collide.solids.cut_points import CutPoints, Rational
 from collide.solids.placed_facets import PlacedFacets
 from collide.solids.ray_passages import count_passages
+from collide.solids.rounded_points import near_points, rounded_points
 
 _MAX_TRIES = 64
+#: More than what underflows in a normal.
+_TINY = 1e-290
 
 
 def shoot(sheets: Sheets, points: CutPoints, rows: np.ndarray, sides: np.ndarray) -> list[tuple[int, np.ndarray]]:
-    """For every sheet of rows (k,) the cell on a side, and each body's winding number in the cell, (r,) int64.
+    """For k parts of an arrangement a cell beside a sheet, and each body's winding number in the cell, (r,) int64.
 
-    sides : (k, 2) the cells before and behind each sheet.
+    rows : (m, k) sheets of each part, to be tried in this order.   sides : (m, k, 2) the cells before and behind them.
+
+    Doubles try all sheets; what they leave open is answered exactly, from the first sheets.
     """
-    facets = points.facets
-    points.load(np.unique(sheets.triangles[rows]).tolist())
-    facets.load(np.unique(facets.corners[sheets.facet[rows]]).tolist())
-    normals = [facets.normal(f) for f in sheets.facet[rows].tolist()]
-    axes = np.array([_largest(n) for n in normals], dtype=np.int64)
-    upwards = np.array([n[axis] > 0 for n, axis in zip(normals, axes.tolist())])
-    winding = np.zeros((len(rows), len(facets.operands)), dtype=np.int64)
-    waiting = np.arange(len(rows))
-    for attempt in range(_MAX_TRIES):
+    k = rows.shape[1]
+    cells, winding = np.empty(k, dtype=np.int64), np.zeros((k, len(points.facets.operands)), dtype=np.int64)
+    waiting = np.arange(k)
+    for attempt in range(len(rows) + _MAX_TRIES):
         if not len(waiting):
             break
-        weights = np.random.default_rng(attempt).integers(1, 1 << 10, (len(waiting), 3))
-        starts = [
-            _within([points.exact(p) for p in triangle], w)
-            for triangle, w in zip(sheets.triangles[rows[waiting]].tolist(), weights.tolist())
-        ]
-        winding[waiting], is_unclear = _windings(facets, starts, axes[waiting])
+        exactly = attempt >= len(rows)
+        row = 0 if exactly else attempt
+        some = rows[row, waiting]
+        starts = _Starts(sheets, points, some, attempt)
+        cells[waiting] = np.where(starts.upwards, *sides[row, waiting].T)
+        winding[waiting], is_unclear = _windings(points.facets, starts, exactly)
         waiting = waiting[is_unclear]
     if len(waiting):
         raise CollideError("every ray of an arrangement of solids passes an edge; please report it")
-    return list(zip(np.where(upwards, sides[:, 0], sides[:, 1]).tolist(), winding))
+    return list(zip(cells.tolist(), winding))
+
+
+class _Starts:
+    """Points within sheets (k,), and axes of rays: points in doubles, and exact for those asked for.
+
+    place : (k, 3) in W [m].   facet : (k,) rows.   axes, upwards : (k,) as of `_axes`.
+    """
+
+    def __init__(self, sheets: Sheets, points: CutPoints, rows: np.ndarray, attempt: int):
+        self._points, self._triangles, self.facet = points, sheets.triangles[rows], sheets.facet[rows]
+        self.axes, self.upwards = _axes(points, self.facet)
+        number = np.arange(1, len(rows) + 1)[:, None]
+        self._weights = 1 + (np.array([389, 613, 797]) * number + np.array([211, 503, 97]) * attempt) % 1021
+        # Corners are off by one unit of M at most, the largest size; a product, two sums and a quotient of positive
+        # shares by five: `slack` is 32 units of no less than M, of which vertices take six and differences one.
+        corners = rounded_points(points, self._triangles.ravel())[0].reshape(-1, 3, 3)
+        self.place = (corners * self._weights[:, :, None]).sum(axis=1) / self._weights.sum(axis=1, keepdims=True)
+
+    def exact(self, k: int) -> Rational:
+        """Point number k."""
+        corners = self._triangles[k].tolist()
+        self._points.load(corners)
+        return _within([self._points.exact(p) for p in corners], self._weights[k].tolist())
+
+
+def _axes(points: CutPoints, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """((k,) axes along which facets are seen nearly largest, (k,) bool: facets whose fronts look up the axis).
+
+    With corners off by a unit u M of their size M, edges below L are off by 4u M, and normals by 2 (2L 4u M) and
+    rounding: less than 32u M L.
+    """
+    facets = points.facets
+    corners = near_points(points).place[facets.corners[rows]]
+    edges = corners[:, 1:] - corners[:, :1]
+    normals = np.cross(edges[:, 0], edges[:, 1])
+    axes = np.abs(normals).argmax(axis=1)
+    height = normals[np.arange(len(rows)), axes]
+    limit = 2.0**-48 * np.abs(corners).max(axis=(1, 2)) * np.abs(edges).max(axis=(1, 2)) + _TINY
+    upwards = height > 0.0
+    for k in np.flatnonzero(~(np.abs(height) > limit)).tolist():
+        n = facets.normal(int(rows[k]))
+        axes[k] = _largest(n)
+        upwards[k] = n[axes[k]] > 0
+    return axes, upwards
 
 
 def _largest(normal) -> int:
@@ -55,16 +99,24 @@ def _within(corners: list[Rational], weights: list[int]) -> Rational:
     return x, y, z, sum(weights) * w
 
 
-def _windings(facets: PlacedFacets, starts: list[Rational], axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """((k, r) how often bodies wind around points a little further along the axes, (k,) bool: an edge is passed)."""
-    places = np.array([facets.in_world(p) for p in starts])
-    winding = np.zeros((len(starts), len(facets.operands)), dtype=np.int64)
-    is_unclear = np.zeros(len(starts), dtype=bool)
+def _windings(facets: PlacedFacets, starts: _Starts, exactly: bool) -> tuple[np.ndarray, np.ndarray]:
+    """((k, r) how often bodies wind around points a little further along the axes, (k,) bool: doubles leave facets open
+    or, asked exactly, an edge is passed).
+    """
+    axes = starts.axes
+    winding = np.zeros((len(axes), len(facets.operands)), dtype=np.int64)
+    is_unclear = np.zeros(len(axes), dtype=bool)
     for k, operand in enumerate(facets.operands):
-        winding[:, k], remaining = count_passages(facets.tree_of(k), operand.X, places, axes, facets.slack)
-        remaining_rows = facets.rows_of(k, remaining[:, 1])
-        for ray, f in zip(remaining[remaining_rows >= 0, 0].tolist(), remaining_rows[remaining_rows >= 0].tolist()):
-            passage = _passage(facets, f, starts[ray], int(axes[ray]))
+        # The facet of a start is not ahead of the ray.
+        skipped = np.where(facets.body[starts.facet] == k, facets.number[starts.facet], -1)
+        winding[:, k], remaining = count_passages(
+            facets.tree_of(k), operand.X, starts.place, axes, skipped, facets.slack
+        )
+        if not exactly:
+            is_unclear[remaining[:, 0]] = True
+            continue
+        for ray, f in zip(remaining[:, 0].tolist(), facets.rows_of(k, remaining[:, 1]).tolist()):
+            passage = _passage(facets, f, starts.exact(ray), int(axes[ray])) if f >= 0 else 0
             if passage is None:
                 is_unclear[ray] = True
             else:

@@ -289,7 +289,7 @@ def test_faults_are_noticed(monkeypatch):
         (around_edges, "around_edge", around_backwards),
         (facet_cuts.FacetCuts, "_cross_segments", lambda self, f: None),
         (facet_cuts.FacetCuts, "_lies_within", lambda self, p, s, u, v: False),
-        (rays, "count_passages", lambda tree, X, points, axes, slack: (0, np.zeros((0, 2), dtype=np.int64))),
+        (rays, "count_passages", lambda tree, X, points, axes, skipped, slack: (0, np.zeros((0, 2), dtype=np.int64))),
         (split_facets, "clip_parts", without_an_ear),
     ]
     for owner, name, fault in faults:
