@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collide import polytopes as polytopes
     from collide import results as results
     from collide import transforms as transforms
+    from collide.base.array_libraries import to_library
     from collide.casts.ray_hits import RayHits
     from collide.casts.raycast import raycast
     from collide.casts.shape_cast import ShapeCasts, shape_cast
@@ -111,6 +112,7 @@ _HOMES = {
         "CollideError", "InvalidArgument", "InvalidPose", "InvalidShape", "MissingExtra", "SceneError",
         "UnknownBody", "UnsupportedQuery",
     ),
+    "collide.base.array_libraries": ("to_library",),
     "collide.casts.ray_hits": ("RayHits",),
     "collide.casts.raycast": ("raycast",),
     "collide.casts.shape_cast": ("ShapeCasts", "shape_cast"),
@@ -191,8 +193,8 @@ __all__ = [
     "configuration_obstacle", "contacts", "contains", "distance", "enclosing_spheres", "facet_pairs", "get_include",
     "get_library", "moved_poses", "overlap_volume", "overlapping_cells", "overlay", "plan", "pose", "poses",
     "poses_in_motion", "propose_disabled_pairs", "raycast", "read_sweep", "repaired", "self_collisions",
-    "self_overlapping_cells", "shape_cast", "signed_distances", "sweep", "tessellate", "time_of_impact", "verify",
-    "walk",
+    "self_overlapping_cells", "shape_cast", "signed_distances", "sweep", "tessellate", "time_of_impact", "to_library",
+    "verify", "walk",
 ]
 
 

@@ -45,6 +45,7 @@ from typing import TYPE_CHECKING, Any, Generic, Literal, overload
 import numpy as np
 
 from collide.base import argument_checks as checks
+from collide.base.array_libraries import to_library
 from collide.errors import InvalidArgument
 
 if TYPE_CHECKING:
@@ -207,6 +208,24 @@ class PairResult(Generic[Form]):
         """
         return self._certify(*self.question, self)
 
+    def to(self, like: Any) -> Any:
+        """The same result with arrays of PyTorch or JAX in place of NumPy's (`collide.to_library`).
+
+        Parameters
+        ----------
+        like : "numpy", "torch", "jax", or an array of one of these libraries.
+
+        Returns
+        -------
+        An object with the same fields. Tensors of PyTorch share memory with ``rows``; numbers of a single result stay
+        Python's.
+
+        Raises
+        ------
+        InvalidArgument, MissingExtra
+        """
+        return to_library(self, like)
+
     @overload
     def __getitem__(self, k: int) -> PairResult[Single]: ...
     @overload
@@ -346,6 +365,23 @@ class WorldResult:
         row = self.rows[_row_number(k, len(self.rows))]
         a, b = self._bodies[int(row["a"])], self._bodies[int(row["b"])]
         return PairResult(row.reshape(1), True, (a.shape, b.shape, a.X_WB[None], b.X_WB[None]), self._certify)
+
+    def to(self, like: Any) -> Any:
+        """The same rows with columns as arrays of PyTorch or JAX (`collide.to_library`).
+
+        Parameters
+        ----------
+        like : "numpy", "torch", "jax", or an array of one of these libraries.
+
+        Returns
+        -------
+        An object with the same columns.
+
+        Raises
+        ------
+        InvalidArgument, MissingExtra
+        """
+        return to_library(self, like)
 
     def __len__(self) -> int:
         return len(self.rows)

@@ -194,16 +194,22 @@ def as_pose(X: PoseLike, name: str = "X", *, check: bool = True) -> np.ndarray:
 def poses_as_given(X: PoseLike, name: str, *, check: bool = True) -> tuple[np.ndarray, bool]:
     """(poses as `as_poses` gives them, whether a single one was given)."""
     check = checks.true_or_false("check_poses: check", check)
+    batch, single = unchecked_poses(X, name)
+    if not (check and _are_surely_poses(batch)):
+        refuse_no_pose(batch, name, check)
+    return batch, single
+
+
+def unchecked_poses(X: PoseLike, name: str) -> tuple[np.ndarray, bool]:
+    """The same for kernels, which check entries themselves: the caller's own memory where the array holds doubles in C
+    order, else a single copy.
+    """
     full = _from_tuple(X, name) if isinstance(X, tuple) else _from_object(X, name)
     if full.ndim in (2, 3) and full.shape[-2:] == (3, 4):
         full = _from_tuple((full[..., :3], full[..., 3]), name)
     if full.ndim not in (2, 3) or full.shape[-2:] != (4, 4):
         raise InvalidPose(f"{name} must have shape (4, 4) or (N, 4, 4), got {full.shape}{_advice(full)}")
-    batch = np.ascontiguousarray(full.reshape(-1, 4, 4))
-    if check and _are_surely_poses(batch):
-        return batch, full.ndim == 2
-    refuse_no_pose(batch, name, check)
-    return batch, full.ndim == 2
+    return np.ascontiguousarray(full.reshape(-1, 4, 4)), full.ndim == 2
 
 
 def _advice(values: np.ndarray) -> str:

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from collide.base import array_libraries
 from collide.errors import CollideError, InvalidArgument, brief
 
 #: Array kinds read directly; arrays of objects are read entry by entry.
@@ -211,10 +212,12 @@ def plain_array(what: str, value: Any, wanted: str, error: type[CollideError]) -
     """Any array or array-like, of any type: nothing ragged, masked, or nested without end."""
     if _is_masked(value) or (isinstance(value, (list, tuple)) and any(map(_is_masked, value))):
         raise error(f"{what} has masked entries; fill them or leave them out ({wanted} is wanted)")
+    if (refusal := array_libraries.refusal(value)) is not None:
+        raise error(f"{what} {refusal}; got {brief(value)}")
     try:
-        return np.asarray(value)
+        return array_libraries.read(value)
     except (TypeError, ValueError, OverflowError, RecursionError, MemoryError, RuntimeError) as reason:
-        if hasattr(value, "__array__"):  # a tensor on another device, or with a gradient: its own words tell more
+        if hasattr(value, "__array__"):  # a sparse tensor, for instance: its own words tell more
             raise error(f"{what} must be an array of numbers {wanted}: {reason}; got {brief(value)}") from None
         # numpy's own words for rows of different lengths are long, and tell no more
         raise error(

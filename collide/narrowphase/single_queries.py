@@ -80,9 +80,12 @@ def _in_python(function: Any, prepare: Callable, result: Any, certify: Callable 
     return query
 
 
-def _are_plain(arguments: tuple, *, check_poses=True, threads=1, axes=None, algorithm=None, **_) -> bool:
+def _are_plain(
+    arguments: tuple, *, check_poses=True, threads=1, axes=None, algorithm=None, depth="quick", like=None, **_
+) -> bool:
     plain = check_poses.__class__ is bool and threads.__class__ is int and threads == 1
-    return len(arguments) == 4 and plain and axes is None and algorithm is None
+    plain = plain and isinstance(depth, str) and depth == "quick"
+    return len(arguments) == 4 and plain and axes is None and algorithm is None and like is None
 
 
 def _are_batch(X_WA: Any, X_WB: Any) -> bool:

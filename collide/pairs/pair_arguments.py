@@ -7,7 +7,7 @@ import numpy as np
 from collide.base import argument_checks as checks
 from collide.shapes.shape import Shape, checked_shape
 from collide.shapes.shape_set import Picked
-from collide.transforms import poses_as_given
+from collide.transforms import unchecked_poses
 
 
 def asked_poses(A, B, X_WA, X_WB) -> tuple[np.ndarray, np.ndarray, bool]:
@@ -45,7 +45,7 @@ def pose_batch(X, name: str) -> tuple[np.ndarray, bool]:
     """(poses (n, 4, 4), whether a single one was given)."""
     if type(X) is np.ndarray and X.dtype == np.float64 and X.ndim in (2, 3) and X.shape[-2:] == (4, 4):
         return np.ascontiguousarray(X).reshape(-1, 4, 4), X.ndim == 2
-    return poses_as_given(X, name, check=False)
+    return unchecked_poses(X, name)
 
 
 def shape_at(shapes, k: int) -> Shape:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from collide.base import argument_checks as checks
+from collide.base.array_libraries import library_of, to_library
 from collide.base.threads import check_threads
 from collide.certificates.make_certificate import certify
 from collide.errors import InvalidArgument, UnsupportedQuery
@@ -37,12 +38,12 @@ if TYPE_CHECKING:
 @overload
 def collide(
     A: Shape, B: Shape, X_WA: Pose, X_WB: Pose, *, security_margin: float = ..., check_poses: bool = ...,
-    threads: int = ..., axes: NDArray[np.float64] | None = ..., algorithm: str | None = ...,
+    threads: int = ..., axes: NDArray[np.float64] | None = ..., algorithm: str | None = ..., like: None = ...,
 ) -> bool: ...
 @overload
 def collide(
     A: Shapes, B: Shapes, X_WA: PoseLike, X_WB: PoseLike, *, security_margin: float = ..., check_poses: bool = ...,
-    threads: int = ..., axes: NDArray[np.float64] | None = ..., algorithm: str | None = ...,
+    threads: int = ..., axes: NDArray[np.float64] | None = ..., algorithm: str | None = ..., like: Any = ...,
 ) -> Any: ...
 @asks_prepared_pairs(prepare_pair)
 def collide(
@@ -56,6 +57,7 @@ def collide(
     threads=1,
     axes=None,
     algorithm=None,
+    like=None,
 ):
     """Whether the closed sets A and B share a point.
 
@@ -66,7 +68,8 @@ def collide(
         are then batches of this length.
     X_WA, X_WB : (4, 4) or (N, 4, 4) array_like, float64
         Poses of A and B in the world W [m]; a single pose goes with every pose of the other's batch. ``(R, t)`` tuples
-        and scipy's rotations are accepted (`transforms.as_poses`).
+        and scipy's rotations are accepted (`transforms.as_poses`), and arrays of PyTorch and JAX in the processor's
+        memory (docs/arrays.md).
     security_margin : float
         [m], ≥ 0, finite: bodies at most so far apart count as hits, too. Decided by the proven bracket of the distance,
         and where the margin lies within the bracket by growing a body (`security_margin.py`): exactly between polytopes
@@ -83,6 +86,9 @@ def collide(
         "gjk" (or ``None``), the default; or "barba-langerman", for two convex polytopes and one thread: the walk along
         bounded hierarchies, in O(log n + log m) rounds (docs/barba-langerman.md). The answers are the same; the default
         is faster. The hierarchies are built when first needed, and kept with the shapes.
+    like : str or array, optional
+        "torch", "jax", "numpy" or an array of one of these libraries: a batch comes back as an array of the library
+        (`collide.to_library`).
 
     Returns
     -------
@@ -104,6 +110,13 @@ def collide(
     GJK (Gilbert, Johnson and Keerthi 1988) with proven bounds, in O(log n + log m) a round from 224 vertices on, after
     Dobkin and Kirkpatrick; integers where doubles leave the sign open. Pairs with meshes walk two box-trees.
     """
+    if like is not None:
+        library_of(like)
+        hits = collide(
+            A, B, X_WA, X_WB, security_margin=security_margin, check_poses=check_poses, threads=threads, axes=axes,
+            algorithm=algorithm,
+        )
+        return hits if isinstance(hits, bool) else to_library(hits, like)
     margin = checked_margin("security_margin", security_margin)
     if margin and (axes is not None or algorithm is not None):
         raise InvalidArgument("security_margin goes with neither axes nor algorithm")
@@ -163,12 +176,19 @@ def _with_axes(A, B, X_WA, X_WB, check_poses: bool, threads: int, axes):
 def distance(
     A: Shape, B: Shape, X_WA: Pose, X_WB: Pose, *, max_distance: float = ..., signed: bool = ...,
     check_poses: bool = ..., threads: int = ..., algorithm: str | None = ..., depth: DepthSearch = ...,
+    like: None = ...,
 ) -> PairResult[Single]: ...
 @overload
 def distance(
     A: Shapes, B: Shapes, X_WA: PoseLike, X_WB: PoseLike, *, max_distance: float = ..., signed: bool = ...,
     check_poses: bool = ..., threads: int = ..., algorithm: str | None = ..., depth: DepthSearch = ...,
+    like: None = ...,
 ) -> PairResult: ...
+@overload
+def distance(
+    A: Shapes, B: Shapes, X_WA: PoseLike, X_WB: PoseLike, *, max_distance: float = ..., signed: bool = ...,
+    check_poses: bool = ..., threads: int = ..., algorithm: str | None = ..., depth: DepthSearch = ..., like: Any,
+) -> Any: ...
 @asks_prepared_pairs(prepare_pair, PairResult, certify)
 def distance(
     A,
@@ -182,6 +202,7 @@ def distance(
     threads=1,
     algorithm=None,
     depth="quick",
+    like=None,
 ):
     """Signed distance of A and B, with witness points, normal and a proven bracket.
 
@@ -207,6 +228,8 @@ def distance(
         "least", the shortest translation known, with lower and upper near each other. Searched for are `Compound`s of
         bounded convex shapes (a bracket of 0.1 % as a rule, in 30 ms a pose), and a mesh and a mesh or polytope (10 %
         in the median, in 0.5 s). Not with an algorithm. All other rows are the same.
+    like : str or array, optional
+        As of `collide`: fields are arrays of the library, as by `PairResult.to`.
 
     Returns
     -------
@@ -232,6 +255,13 @@ def distance(
     compares all m·k pairs of boxes, and asks about pairs that overlap or come as near as the nearest parts are. Curved
     shapes within a mesh of n facets take O(n) where all its facets are near.
     """
+    if like is not None:
+        library_of(like)
+        result = distance(
+            A, B, X_WA, X_WB, max_distance=max_distance, signed=signed, check_poses=check_poses, threads=threads,
+            algorithm=algorithm, depth=depth,
+        )
+        return to_library(result, like)
     limit = checks.limit("max_distance", max_distance)
     signed = checks.true_or_false("signed", signed)
     least = checked_depth(depth) and signed

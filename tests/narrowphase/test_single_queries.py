@@ -45,12 +45,18 @@ def prepared_boxes() -> tuple[collide.Box, collide.Box]:
 @pytest.mark.parametrize(
     ("ask", "options"),
     [
-        (collide.collide, {"security_margin": 0.0, "check_poses": True, "threads": 1, "axes": None, "algorithm": None}),
+        (
+            collide.collide,
+            {
+                "security_margin": 0.0, "check_poses": True, "threads": 1, "axes": None, "algorithm": None,
+                "like": None,
+            },
+        ),
         (
             collide.distance,
             {
                 "max_distance": math.inf, "signed": True, "depth": "quick", "check_poses": True, "threads": 1,
-                "algorithm": None,
+                "algorithm": None, "like": None,
             },
         ),
         (collide.contacts, {"margin": 0.0, "max_contacts": 8, "check_poses": True, "threads": 1}),

@@ -174,6 +174,7 @@ def test_every_example_is_known():
 #: What a page's Python takes as given: run before it, in a folder with the files of `_FILES`.
 GIVEN = {
     "README": "",
+    "arrays": "",
     "python": "",
     "clouds": "",
     "voxels": "",
@@ -223,6 +224,7 @@ GIVEN = {
 }
 #: Packages that a page's Python needs.
 NEEDED = {
+    "arrays": ("torch",),
     "robots": ("yaml", "mujoco"), "disabled-pairs": ("yaml",), "engines": ("mujoco",), "pages": ("yaml",),
     "report-schema": ("yaml", "trimesh"), "scene-format": ("yaml",), "planning": ("yaml", "ompl"),
 }
