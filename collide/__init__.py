@@ -207,11 +207,17 @@ if not TYPE_CHECKING:  # checkers are to know the names above, and no others
         if name in _MODULES:
             return import_module(f"collide.{name}")
         if name not in _HOME and name not in _RENAMED:
-            raise AttributeError(f"module 'collide' has no attribute {name!r}")
+            advice = "" if name.startswith("__") else _advice_on(name)
+            raise AttributeError(f"module 'collide' has no attribute {name!r}{advice}")
         module, attribute = _RENAMED.get(name) or (_HOME[name], name)
         value = getattr(import_module(module), attribute)
         globals()[name] = value
         return value
+
+
+def _advice_on(name: str) -> str:
+    """What to write in place of a name of another library, or of one spelt wrongly."""
+    return import_module("collide.base.foreign_names").advice_on_name(name, (*__all__, *_MODULES))
 
 
 def __dir__():

@@ -97,6 +97,27 @@ class SceneError(CollideError, ValueError):
         self.element = None if element is None else cut(element, LONGEST_PLACE)
         place = ": ".join(str(p) for p in (path, self.element) if p is not None)
         super().__init__(f"{place}: {self.what}" if place else self.what)
+        #: Of an error that stands for several: the message of each.
+        self.messages: tuple[str, ...] = ()
+
+    @classmethod
+    def of_several(cls, messages: Iterable[str]) -> SceneError:
+        """A single error with the complaints of several.
+
+        Parameters
+        ----------
+        messages : iterable of str
+            The message of each, two or more.
+
+        Returns
+        -------
+        SceneError
+            With all of them in its text and in ``messages``.
+        """
+        messages = [*messages]
+        made = cls(f"{len(messages)} complaints: " + "; ".join(messages))
+        made.messages = tuple(messages)
+        return made
 
 
 class MissingExtra(CollideError, ImportError):

@@ -19,11 +19,13 @@ re-orthonormalised. `as_poses` refuses what is too far from a rotation to be one
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from collide.base import argument_checks as checks
+from collide.base.foreign_arguments import foreign_arguments
 from collide.errors import InvalidPose
 
 if TYPE_CHECKING:
@@ -43,19 +45,24 @@ if TYPE_CHECKING:
 ROTATION_TOLERANCE = 1e-4
 #: Coordinates beyond this are refused: products of six of them must stay finite.
 LARGEST = 1e50
+#: Angles in radians are refused beyond this, a turn and the rounding of one written down: they are degrees, mostly.
+FULL_TURN = 2.0 * math.pi * (1.0 + 1e-4)
 #: Positive sizes below this are refused, for the same reason at the other end.
 SMALLEST = 1e-50
 
 
-def pose(xyz=(0.0, 0.0, 0.0), *, rpy=None, quat_wxyz=None, quat_xyzw=None, R=None) -> Pose:
-    """A (4, 4) pose from a translation and a rotation, described in any of four ways.
+@foreign_arguments
+def pose(xyz=(0.0, 0.0, 0.0), *, rpy=None, rpy_deg=None, quat_wxyz=None, quat_xyzw=None, R=None) -> Pose:
+    """A (4, 4) pose from a translation and a rotation, described in any of five ways.
 
     Parameters
     ----------
     xyz : (3,) array_like, float64
         Translation [m].
     rpy : (3,) array_like, optional
-        Roll, pitch, yaw [rad] about fixed x, y, z axes, as in URDF.
+        Roll, pitch, yaw [rad] about fixed x, y, z axes, as in URDF; each at most a full turn.
+    rpy_deg : (3,) array_like, optional
+        The same in degrees, of any size; multiples of 90 give entries of exactly 0 and ±1.
     quat_wxyz : (4,) array_like, optional
         Quaternion, scalar first, of any length but 0; normalised here, because a quaternion in a file carries rounded
         digits and means the rotation.
@@ -72,17 +79,22 @@ def pose(xyz=(0.0, 0.0, 0.0), *, rpy=None, quat_wxyz=None, quat_xyzw=None, R=Non
     Raises
     ------
     InvalidPose
-        Where numbers have another shape, are not finite or make no rotation, or two rotations are given.
+        Where numbers have another shape, are not finite or make no rotation, an angle in radians exceeds a full turn,
+        or two rotations are given.
     """
-    if rpy is None and quat_wxyz is None and quat_xyzw is None and R is None:
+    if rpy is None and rpy_deg is None and quat_wxyz is None and quat_xyzw is None and R is None:
         shifted = _plain_shift(xyz)
         if shifted is not None:
             return shifted
-    if sum(option is not None for option in (rpy, quat_wxyz, quat_xyzw, R)) > 1:
-        raise InvalidPose("pose: give at most one of rpy, quat_wxyz, quat_xyzw and R")
+    if sum(option is not None for option in (rpy, rpy_deg, quat_wxyz, quat_xyzw, R)) > 1:
+        raise InvalidPose("pose: give at most one of rpy, rpy_deg, quat_wxyz, quat_xyzw and R")
     X = np.eye(4)
     if rpy is not None:
-        X[:3, :3] = rotation_from_rpy(_finite("rpy", rpy, (3,)))
+        angles = _finite("rpy", rpy, (3,))
+        refuse_degrees("pose: rpy", angles[None])
+        X[:3, :3] = rotation_from_rpy(angles)
+    elif rpy_deg is not None:
+        X[:3, :3] = rotation_from_degrees(_finite("rpy_deg", rpy_deg, (3,)))
     elif quat_wxyz is not None:
         X[:3, :3] = _rotation_from_quaternion(_finite("quat_wxyz", quat_wxyz, (4,)))
     elif quat_xyzw is not None:
@@ -110,7 +122,8 @@ def _plain_shift(xyz) -> Pose | None:
 def _finite(name: str, values, shape) -> np.ndarray:
     array = checks.array(f"pose: {name}", values, str(shape), InvalidPose)
     if array.shape != shape or not np.isfinite(array).all():
-        raise InvalidPose(f"pose: {name} must be {shape} finite numbers, got {checks.brief(values)}")
+        known = "; a matrix (4, 4) is a pose already" if name == "xyz" and array.shape == (4, 4) else ""
+        raise InvalidPose(f"pose: {name} must be {shape} finite numbers, got {checks.brief(values)}{known}")
     return array
 
 
@@ -129,6 +142,34 @@ def rotation_from_rpy(rpy: np.ndarray) -> np.ndarray:
             [-sp, cp * sr, cp * cr],
         ]
     )
+
+
+def rotation_from_degrees(rpy_deg: np.ndarray) -> np.ndarray:
+    """(3, 3) rotation of roll, pitch, yaw [degrees]; multiples of 90° give exact 0 and ±1."""
+    R = np.eye(3)
+    for axis, angle in enumerate(rpy_deg):
+        turns = angle / 90.0
+        if turns == round(turns):
+            c, s = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[round(turns) % 4]
+        else:
+            c, s = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+        i, j = (axis + 1) % 3, (axis + 2) % 3
+        R_axis = np.eye(3)
+        R_axis[i, i], R_axis[i, j], R_axis[j, i], R_axis[j, j] = c, -s, s, c
+        R = R_axis @ R
+    return R
+
+
+def refuse_degrees(name: str, rpy: np.ndarray) -> None:
+    """Refuse angles (n, 3) [rad] beyond a full turn, which are degrees by all likelihood. Raises InvalidPose."""
+    beyond = np.abs(rpy).max(axis=1, initial=0.0) > FULL_TURN
+    if beyond.any():
+        k = int(np.argmax(beyond))
+        where = f"{name}[{k}]" if len(rpy) > 1 else name
+        raise InvalidPose(
+            f"{where} holds radians, and {rpy[k].tolist()} exceeds a full turn: are these degrees? Then write "
+            "rpy_deg=; radians of several turns are numpy.remainder(rpy, 2 * numpy.pi)"
+        )
 
 
 def _rotation_from_quaternion(q: np.ndarray) -> np.ndarray:
@@ -204,6 +245,8 @@ def unchecked_poses(X: PoseLike, name: str) -> tuple[np.ndarray, bool]:
     """The same for kernels, which check entries themselves: the caller's own memory where the array holds doubles in C
     order, else a single copy.
     """
+    if X is None:
+        raise InvalidPose(f"{name} must be a pose (4, 4), got None: the identity is collide.pose()")
     full = _from_tuple(X, name) if isinstance(X, tuple) else _from_object(X, name)
     if full.ndim in (2, 3) and full.shape[-2:] == (3, 4):
         full = _from_tuple((full[..., :3], full[..., 3]), name)
@@ -213,7 +256,15 @@ def unchecked_poses(X: PoseLike, name: str) -> tuple[np.ndarray, bool]:
 
 
 def _advice(values: np.ndarray) -> str:
-    """How to hand in a translation and a quaternion in one row, whose order the row does not tell."""
+    """How to hand in a position or a rotation alone, or a row of translation and quaternion, whose order the row does
+    not tell.
+    """
+    if values.shape == (3,):
+        return f": a position alone is collide.pose({tuple(values.tolist())})"
+    if values.shape == (3, 3):
+        return ": a rotation alone is collide.pose(R=rotation), three positions are collide.poses(positions)"
+    if values.ndim == 2 and values.shape[1] == 3:
+        return ": positions alone are collide.poses(positions)"
     if values.ndim not in (1, 2) or values.shape[-1] != 7:
         return ""
     return (
@@ -256,7 +307,9 @@ def _from_object(X, name: str) -> np.ndarray:
 
 def _from_tuple(X: tuple, name: str) -> np.ndarray:
     if len(X) != 2:
-        raise InvalidPose(f"{name}: a tuple must be (R, t), got {len(X)} items")
+        numbers = [checks.number(value) for value in X]
+        advice = "" if None in numbers else _advice(np.array(numbers))
+        raise InvalidPose(f"{name}: a tuple must be (R, t), got {len(X)} items{advice}")
     R, t = _to_floats(_matrix_of(X[0]), name), _to_floats(X[1], name)
     if R.shape[-2:] != (3, 3) or t.shape[-1:] != (3,) or R.ndim > 3 or t.ndim > 2:
         raise InvalidPose(f"{name}: (R, t) must have shapes (3, 3) and (3,), got {R.shape} and {t.shape}")

@@ -55,8 +55,41 @@ def test_quaternions_that_are_none(q):
 
 
 def test_one_description_of_a_rotation():
-    with pytest.raises(InvalidPose, match="at most one of rpy, quat_wxyz, quat_xyzw and R"):
+    with pytest.raises(InvalidPose, match="at most one of rpy, rpy_deg, quat_wxyz, quat_xyzw and R"):
         pose(quat_wxyz=(1, 0, 0, 0), quat_xyzw=(0, 0, 0, 1))
+
+
+@pytest.mark.parametrize("rpy", [(90, 0, 0), (0, -6.3, 0), (0, 0, 1e9)])
+def test_radians_beyond_a_full_turn_are_asked_about(rpy):
+    with pytest.raises(InvalidPose, match=r"pose: rpy holds radians, .* are these degrees\? Then write rpy_deg="):
+        pose(rpy=rpy)
+    with pytest.raises(InvalidPose, match=r"poses: rpy\[1\] holds radians"):
+        poses((0, 0, 0), rpy=[(0, 0, 0), rpy])
+
+
+def test_a_full_turn_of_radians_as_files_write_it():
+    for angle in (2 * np.pi, 6.2832, -6.2832):
+        assert np.allclose(pose(rpy=(0, 0, angle)), EYE, atol=1e-4)
+
+
+def test_degrees_are_exact_at_right_angles():
+    assert pose((1, 2, 3), rpy_deg=(0, 90, 0)).tolist() == [[0, 0, 1, 1], [0, 1, 0, 2], [-1, 0, 0, 3], [0, 0, 0, 1]]
+    assert np.array_equal(pose(rpy_deg=(720, -90, 180)), pose(rpy_deg=(0, 270, -180)))
+    rng = np.random.default_rng(5)
+    for angles in rng.uniform(-180, 180, (50, 3)):
+        assert np.allclose(pose(rpy_deg=angles), pose(rpy=np.radians(angles)), atol=4e-16), angles
+
+
+def test_arrays_of_degrees_and_of_scalar_last_quaternions():
+    rng = np.random.default_rng(6)
+    p, angles, q = rng.normal(size=(20, 3)), rng.uniform(-400, 400, (20, 3)), rng.normal(size=(20, 4))
+    assert np.array_equal(poses(p, rpy_deg=angles), [pose(x, rpy_deg=a) for x, a in zip(p, angles)])
+    assert np.allclose(poses(p, quat_xyzw=q), [pose(x, quat_xyzw=a) for x, a in zip(p, q)], atol=1e-15)
+    assert poses(np.zeros((0, 3)), rpy_deg=np.zeros((0, 3))).shape == (0, 4, 4)
+    with pytest.raises(InvalidPose, match="at most one of quat_wxyz, quat_xyzw, rpy and rpy_deg"):
+        poses(p, rpy=angles, rpy_deg=angles)
+    with pytest.raises(InvalidPose, match=r"quat_xyzw .* \(N, 4\)"):
+        poses(p, quat_xyzw=angles)
 
 
 class Turn:

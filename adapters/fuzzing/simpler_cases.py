@@ -15,9 +15,8 @@ import numpy as np
 from collide import distance
 from collide.adapters.fuzzing.fuzz_case import Case
 from collide.errors import CollideError, InvalidShape
-from collide.scenes.loaders.fields import rotation_from_degrees
 from collide.shapes import Box, Compound, ConvexHull, Halfspace, HeightField, HPolytope, Mesh, Shape
-from collide.transforms import pose
+from collide.transforms import pose, rotation_from_degrees
 
 #: What a body, a part, and a point or facet weigh, in digits.
 BODY, PART, POINT = 1000, 200, 40

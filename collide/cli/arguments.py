@@ -12,6 +12,7 @@ import re
 from typing import NoReturn
 
 from collide import __version__
+from collide.base.units import UNIT_NAMES, UNITS
 from collide.cli import bench as cli_bench
 from collide.cli import compare as cli_compare
 from collide.cli import config_command as cli_config
@@ -27,7 +28,7 @@ from collide.cli import srdf as cli_srdf
 from collide.cli import sweep_command as cli_sweep
 from collide.cli import view as cli_view
 from collide.errors import InvalidArgument
-from collide.reports.number_format import UNITS, parse_length
+from collide.reports.number_format import parse_length
 
 
 class UsageError(Exception):
@@ -57,7 +58,7 @@ def parse(argv: list[str]) -> argparse.Namespace:
 
 
 #: Options whose value may begin with a minus.
-_WITH_NUMBERS = ("--state", "--pose", "--box", "--rpy")
+_WITH_NUMBERS = ("--state", "--pose", "--box", "--rpy", "--rpy-deg")
 
 
 def _with_negative_states(argv: list[str]) -> list[str]:
@@ -358,8 +359,7 @@ def _scale(text: str) -> float:
     """A factor, or the unit that mesh files are written in."""
     if text in UNITS:
         return UNITS[text]
-    units = ", ".join(unit for unit in UNITS if unit.isascii() and unit)
-    number = _number(text, f"must be a number or one of the units {units}, got {text!r}")
+    number = _number(text, f"must be a number or one of the units {UNIT_NAMES}, got {text!r}")
     if not math.isfinite(number) or number == 0:
         raise argparse.ArgumentTypeError(f"must be a finite number other than 0, got {text!r}")
     return number

@@ -99,7 +99,8 @@ def _fail(error: Exception) -> int:
             f"this is a bug in collide: {type(error).__name__}: {error} "
             "(COLLIDE_TRACEBACK=1 shows where; please report it)"
         )
-    _say("error: " + " ".join(what.split()))
+    for message in getattr(error, "messages", ()) or (what,):
+        _say("error: " + " ".join(message.split()))
     return ERROR
 
 

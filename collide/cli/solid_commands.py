@@ -75,7 +75,9 @@ def add_obstacle_arguments(parser: argparse.ArgumentParser, add_mesh_arguments: 
     parser.add_argument("b", metavar="B", help="the same: what moves without turning")
     add_mesh_arguments(parser)
     group = _out_arguments(parser, length, MESH_SUFFIXES)
-    group.add_argument("--rpy", type=_numbers(3), metavar="R,P,Y", help="how B is turned first: radians")
+    turned = group.add_mutually_exclusive_group()
+    turned.add_argument("--rpy", type=_numbers(3), metavar="R,P,Y", help="how B is turned first: radians")
+    turned.add_argument("--rpy-deg", type=_numbers(3), metavar="R,P,Y", help="the same in degrees")
 
 
 def _out_arguments(parser: argparse.ArgumentParser, length: Callable, suffixes: tuple[str, ...]):
@@ -190,7 +192,7 @@ def run_obstacle(args: argparse.Namespace, progress: Callable) -> int:
             mesh, off = union_of(solids, progress)
             bodies.append(mesh)
             moved += off
-    R = pose(rpy=args.rpy)[:3, :3] if args.rpy is not None else None
+    R = pose(rpy=args.rpy, rpy_deg=args.rpy_deg)[:3, :3] if args.rpy or args.rpy_deg else None
     r: Any = configuration_obstacle(bodies[0], bodies[1], R, progress=progress)
     r.mesh.save(args.out)
     name = f"obstacle {_stem(args.a)} to {_stem(args.b)}"

@@ -8,13 +8,8 @@ from __future__ import annotations
 
 import math
 
+from collide.base.units import UNIT_NAMES, UNITS
 from collide.errors import InvalidArgument
-
-#: Spellings accepted from a user, in metres.
-UNITS = {
-    "": 1.0, "m": 1.0, "km": 1e3, "dm": 0.1, "cm": 1e-2, "mm": 1e-3,
-    "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "nm": 1e-9, "in": 0.0254, "ft": 0.3048,
-}
 
 
 def parse_length(text: str, what: str = "length") -> float:
@@ -26,8 +21,7 @@ def parse_length(text: str, what: str = "length") -> float:
         value = float(number) * UNITS[unit.strip()]
     except (ValueError, KeyError):
         raise InvalidArgument(
-            f"{what} must be a number of metres or carry one of the units "
-            f"{', '.join(u for u in UNITS if u.isascii() and u)}, got {text!r}"
+            f"{what} must be a number of metres or carry one of the units {UNIT_NAMES}, got {text!r}"
         ) from None
     if not (math.isfinite(value) and value >= 0):
         raise InvalidArgument(f"{what} must be finite and not negative, got {text!r}")

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from collide.base.foreign_arguments import foreign_arguments
 from collide.base.lazy_modules import lazy_module
 from collide.base.log import log_duration
-from collide.errors import InvalidShape
+from collide.errors import InvalidShape, brief
 from collide.shapes.shape import Shape, equal_but_for_signs, facet_ids, mirrors, positive, rows
 from collide.shapes.shape_files import Field, read_arrays, write_arrays
 from collide.transforms import SMALLEST
@@ -59,7 +60,11 @@ class ConvexHull(Shape):
     radius: float
     _hull: Hull
 
+    @foreign_arguments
     def __init__(self, points: ArrayLike, *, faces: ArrayLike | None = None, radius: float = 0.0):
+        if hasattr(points, "vertices"):
+            advice = "the hull of a mesh is ConvexHull(mesh.vertices)"
+            raise InvalidShape(f"ConvexHull: points must be (N, 3), got {brief(points)}; {advice}")
         points = rows("ConvexHull", "points", points, (None, 3))
         largest = float(np.abs(points).max())
         if 0.0 < largest < SMALLEST:

@@ -299,6 +299,10 @@ def _grey_of(image) -> np.ndarray:
             f"{name} must be (r, c) of unsigned integers or floats, got {grey.dtype} {grey.shape}; turn colours to "
             "grey first"
         )
+    if min(grey.shape) < 2 or (grey.dtype.kind == "f" and np.isnan(grey).all()):
+        raise InvalidShape(
+            f"{name} must have at least 2 rows and 2 columns of grey values, not all NaN, got {checks.brief(grey)}"
+        )
     if grey.dtype.kind == "f" and ((grey < 0.0) | (grey > 1.0)).any():
         raise InvalidShape(
             f"{name}: grey values of floats lie within 0 … 1, got {np.nanmin(grey):g} … {np.nanmax(grey):g}; divide by "
@@ -317,7 +321,7 @@ def _read_image(path) -> np.ndarray:
         with Image.open(path) as picture:
             return np.asarray(picture)
     except (OSError, ValueError, Image.DecompressionBombError) as error:
-        raise InvalidShape(f"HeightField.from_image: {checks.brief(path)}: {error}") from None
+        raise InvalidShape(f"HeightField.from_image: image {checks.brief(path)}: {error}") from None
 
 
 def _check_cell(cell) -> np.ndarray:

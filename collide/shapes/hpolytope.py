@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from collide.base import argument_checks as checks
+from collide.base.foreign_arguments import foreign_arguments
 from collide.base.lazy_modules import lazy_module
 from collide.errors import InvalidShape
 from collide.shapes.shape import Shape, plane_numbers, positive, rows
@@ -183,6 +184,7 @@ class Plane(HPolytope):
     offset: float
     thickness: float
 
+    @foreign_arguments
     def __init__(self, normal: ArrayLike, offset: float, thickness: float = 0.0):
         normal, offset = plane_numbers("Plane", normal, offset)
         thickness = positive("Plane", "thickness", thickness, zero=True)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from collide.base.foreign_arguments import foreign_arguments
 from collide.errors import InvalidShape, brief
 from collide.shapes.compound import Compound
 from collide.shapes.convex_hull import ConvexHull
@@ -38,6 +39,7 @@ class Sphere(Shape):
     _fields = __slots__
     radius: float
 
+    @foreign_arguments
     def __init__(self, radius: float):
         self._store(radius=positive("Sphere", "radius", radius))
 
@@ -67,6 +69,7 @@ class Box(Shape):
     _fields = __slots__
     size: np.ndarray
 
+    @foreign_arguments
     def __init__(self, size: ArrayLike, y: float | None = None, z: float | None = None):
         self._store(size=three_lengths("Box", "size", size, y, z, zero=True))
 
@@ -139,6 +142,7 @@ class Capsule(Shape):
     radius: float
     length: float
 
+    @foreign_arguments
     def __init__(self, radius: float, length: float | None = None, *, height: float | None = None):
         length = _one_length("Capsule", length, height)
         self._store(
@@ -183,6 +187,7 @@ class Cylinder(Shape):
     radius: float
     length: float
 
+    @foreign_arguments
     def __init__(self, radius: float, length: float | None = None, *, height: float | None = None):
         length = _one_length("Cylinder", length, height)
         self._store(
@@ -217,6 +222,7 @@ class Cone(Shape):
     radius: float
     length: float
 
+    @foreign_arguments
     def __init__(self, radius: float, length: float | None = None, *, height: float | None = None):
         length = _one_length("Cone", length, height)
         self._store(radius=positive("Cone", "radius", radius), length=positive("Cone", "length", length))
@@ -247,6 +253,7 @@ class Ellipsoid(Shape):
     _fields = __slots__
     radii: np.ndarray
 
+    @foreign_arguments
     def __init__(self, radii: ArrayLike, y: float | None = None, z: float | None = None):
         self._store(radii=three_lengths("Ellipsoid", "radii", radii, y, z))
 
@@ -275,6 +282,7 @@ class Halfspace(Shape):
     normal: np.ndarray
     offset: float
 
+    @foreign_arguments
     def __init__(self, normal: ArrayLike, offset: float):
         normal, offset = plane_numbers("Halfspace", normal, offset)
         self._store(normal=normal, offset=offset)

@@ -11,8 +11,9 @@ from typing import Any, TypeVar
 import numpy as np
 
 from collide.base import argument_checks as checks
+from collide.base.foreign_names import advice_on_shape
 from collide.base.fork_safe_lock import ForkSafeLock
-from collide.errors import InvalidShape, brief
+from collide.errors import InvalidArgument, InvalidShape, brief
 from collide.transforms import LARGEST, SMALLEST
 
 T = TypeVar("T")
@@ -289,7 +290,10 @@ def scalar(shape: str, field: str, value: Any) -> float:
 
 def checked_shape(what: str, value: Any, example: str = "collide.Box((1, 1, 1))") -> Shape:
     """A shape. what : "raycast: shape", for messages.   Raises InvalidArgument."""
-    return checks.instance(what, value, Shape, f"a shape, for example {example}")
+    if not isinstance(value, Shape):
+        advice = advice_on_shape(value)
+        raise InvalidArgument(f"{what} must be a shape, for example {example}, got {brief(value)}{advice}")
+    return value
 
 
 def three_lengths(shape: str, field: str, value: Any, y: Any, z: Any, *, zero: bool = False) -> np.ndarray:

@@ -156,6 +156,8 @@ class WorldBodies:
         self, shape: Shape, X_WB, name: str | None, static: bool, group: int, mask: int, margin: float = 0.0
     ) -> int:
         """The id of a new body; arguments as of `World.add`. Raises InvalidArgument, InvalidPose."""
+        if isinstance(shape, str) and isinstance(X_WB, Shape):
+            raise InvalidArgument(f"World.add: the shape comes first: World.add(shape, X_WB, name={shape!r})")
         checked_shape("World.add: shape", shape, "collide.Sphere(0.1)")
         X_WB = _IDENTITY if X_WB is None else _pose("World.add: X_WB", X_WB)
         identity, row = self._next, len(self._ids)

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from collide.base import argument_checks as checks
+from collide.base.foreign_arguments import foreign_arguments
 from collide.base.fork_safe_lock import ForkSafeLock
 from collide.base.log import log_duration
 from collide.errors import InvalidArgument
@@ -111,6 +112,7 @@ class WorldScene:
                 finally:
                     self._changer = None
 
+    @foreign_arguments
     def add(
         self, shape: Shape, X_WB=None, *, name: str | None = None, static: bool = False, group: int = 1,
         mask: int = 0xFFFF, margin: float = 0.0,

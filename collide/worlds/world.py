@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,6 +27,7 @@ __all__ = ["Body", "World"]
 #: Casts need what other questions about convex scenes do not.
 casts = lazy_module("collide.worlds.casts")
 cast_arguments = lazy_module("collide.casts.cast_arguments")
+foreign_names = lazy_module("collide.base.foreign_names")
 
 
 class World(WorldPairs):
@@ -44,6 +46,13 @@ class World(WorldPairs):
     pairs is kept from query to query while few bodies change. Any number of threads may ask and change a World at once:
     a query is answered as of before a change or as of after, and `changes` makes several changes one.
     """
+
+    if not TYPE_CHECKING:  # checkers are to know the methods, and no others
+
+        def __getattr__(self, name: str):
+            known = [method for method in dir(type(self)) if not method.startswith("_")]
+            advice = "" if name.startswith("_") else foreign_names.advice_on_method(name, known)
+            raise AttributeError(f"'World' object has no attribute {name!r}{advice}")
 
     def query(
         self, shape: Shape | Sequence[Shape], X_WS, max_distance: float = 0.0, *, threads: int = 1

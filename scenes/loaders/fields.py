@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable, Mapping
-from typing import Any, NoReturn
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, NoReturn, TypeVar
 
 import numpy as np
 
-from collide.errors import LONGEST_MESSAGE, LONGEST_PLACE, InvalidPose, SceneError, brief, cut
+from collide.base.units import UNIT_NAMES, UNITS
+from collide.errors import LONGEST_MESSAGE, LONGEST_PLACE, CollideError, InvalidPose, SceneError, brief, cut
 from collide.transforms import as_poses, pose
+
+T = TypeVar("T")
+U = TypeVar("U")
 
 
 class Fields:
@@ -105,6 +109,15 @@ class Fields:
             self.fail(f"must be a finite number, got {brief(value)}", key)
         return number
 
+    def scale(self) -> float:
+        """The key "scale", 1 by default: a number, or the unit of the numbers to be scaled, as "mm"."""
+        value = self.data.get("scale", 1.0)
+        if not isinstance(value, str):
+            return self.checked_number(value, "scale")
+        if not value or value not in UNITS:
+            self.fail(f"must be a number or a unit, one of {UNIT_NAMES}; got {brief(value)}", "scale")
+        return UNITS[value]
+
     def numbers(self, key: str, shape: tuple[int | None, ...]) -> np.ndarray:
         """A finite float64 array; None in ``shape`` stands for any length."""
         if key not in self.data:
@@ -121,6 +134,24 @@ class Fields:
         if not np.isfinite(array).all():
             self.fail(f"must be finite numbers, got {brief(self.data[key])}", key)
         return array
+
+
+def read_each(entries: Iterable[T], read: Callable[[T], U]) -> list[U]:
+    """What is read of each entry. Raises what the reading of an entry raised, of several entries a single SceneError
+    with all complaints, so that everything damaged is known at once.
+    """
+    results: list[U] = []
+    errors: dict[str, CollideError] = {}
+    for entry in entries:
+        try:
+            results.append(read(entry))
+        except CollideError as error:
+            errors.setdefault(str(error), error)
+    if len(errors) == 1:
+        raise next(iter(errors.values()))
+    if errors:
+        raise SceneError.of_several(errors)
+    return results
 
 
 def read_pose(parent: Fields, key: str, metres: float = 1.0) -> np.ndarray:
@@ -141,7 +172,7 @@ def read_pose(parent: Fields, key: str, metres: float = 1.0) -> np.ndarray:
         if "rpy" in fields:
             return pose(xyz, rpy=fields.numbers("rpy", (3,)))
         if "rpy_deg" in fields:
-            return pose(xyz, R=rotation_from_degrees(fields.numbers("rpy_deg", (3,))))
+            return pose(xyz, rpy_deg=fields.numbers("rpy_deg", (3,)))
         if "quat_wxyz" in fields:
             return pose(xyz, quat_wxyz=fields.numbers("quat_wxyz", (4,)))
         if "quat_xyzw" in fields:
@@ -162,22 +193,6 @@ def _matrix(fields: Fields, metres: float) -> np.ndarray:
     X = fields.numbers("matrix", (4, 4)).copy()
     X[:3, 3] = scaled(X[:3, 3], metres)
     return as_poses(X, "matrix")[0]
-
-
-def rotation_from_degrees(rpy_deg: np.ndarray) -> np.ndarray:
-    """(3, 3) rotation of roll, pitch, yaw [degrees]; multiples of 90° give exact 0 and ±1."""
-    R = np.eye(3)
-    for axis, angle in enumerate(rpy_deg):
-        turns = angle / 90.0
-        if turns == round(turns):
-            c, s = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[round(turns) % 4]
-        else:
-            c, s = math.cos(math.radians(angle)), math.sin(math.radians(angle))
-        i, j = (axis + 1) % 3, (axis + 2) % 3
-        R_axis = np.eye(3)
-        R_axis[i, i], R_axis[i, j], R_axis[j, i], R_axis[j, j] = c, -s, s, c
-        R = R_axis @ R
-    return R
 
 
 def scaled(values, metres: float):

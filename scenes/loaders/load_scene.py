@@ -13,12 +13,14 @@ import numpy as np
 from collide import scenes
 from collide.base import argument_checks as checks
 from collide.base.given_files import starts_like_xml
-from collide.errors import LONGEST_PLACE, InvalidArgument, SceneError, brief, cut
+from collide.base.units import scale_factor
+from collide.errors import LONGEST_PLACE, InvalidArgument, SceneError, cut
 from collide.robots.robot import Robot
 from collide.scenes.description import Scene, SceneBody, free_name
 from collide.scenes.loaders import mesh_file as mesh_loader
 from collide.scenes.loaders import mjcf, moveit, moveit_text, scene_yaml, sdformat, states, urdf
 from collide.scenes.loaders.documents import read_document
+from collide.scenes.loaders.fields import read_each
 from collide.scenes.loaders.mesh_shapes import part_shape
 from collide.scenes.loaders.robot_file import load_robot
 from collide.scenes.loaders.xml_text import parse_xml
@@ -38,7 +40,7 @@ class Options:
     srdf: Any = None
     meshes: str = "mesh"
     package_path: tuple = ()
-    scale: float | None = None
+    scale: float = 1.0
     missing_meshes: str = "error"
 
     def for_robots(self) -> dict[str, Any]:
@@ -53,7 +55,7 @@ def load(
     srdf: str | Path | bool | None = None,
     meshes: str = "mesh",
     package_path: str | Path | Iterable = (),
-    scale: float | None = None,
+    scale: float | str | None = None,
     missing_meshes: str = "error",
 ) -> Scene:
     """A scene from one file, several files together, or the name of a shipped scene.
@@ -77,8 +79,8 @@ def load(
         convex pieces (coacd). Each body's ``approximation`` says what was repaired, or what the last two leave out.
     package_path : str, Path or iterable of them
         Folders in which ``package://`` names are looked for first.
-    scale : float, optional
-        Factor on the vertices of mesh files that are named directly: 0.001 for millimetres.
+    scale : float or str, optional
+        Factor on the vertices of mesh files that are named directly, or their unit: 0.001 or "mm".
     missing_meshes : {"error", "skip"}
         "skip": links whose mesh is absent are not checked, which is noted.
 
@@ -93,9 +95,10 @@ def load(
         Naming file, element and value.
     """
     started = time.perf_counter()
-    options = Options(robot, srdf, meshes, tuple(_paths(package_path)), scale, missing_meshes)
+    factor = 1.0 if scale is None else scale_factor("scale", scale, SceneError)
+    options = Options(robot, srdf, meshes, tuple(_paths(package_path)), factor, missing_meshes)
     mesh_loader.check_meshes_option(meshes)
-    parts = [_load_one(_resolve(path_or_name), options) for path_or_name in (path, *more_paths)]
+    parts = read_each((path, *more_paths), lambda path_or_name: _load_one(_resolve(path_or_name), options))
     scene = parts[0] if len(parts) == 1 else _together(parts)
     if state is not None:
         scene = _in_state(scene, state)
@@ -228,10 +231,7 @@ def _load_document(path: Path, options: Options) -> Scene:
 
 def load_meshes(path: Path, options: Options) -> Scene:
     """One body for each mesh of a file, free to move, so that bodies of a file are tested too."""
-    scale = 1.0 if options.scale is None else checks.number(options.scale)
-    if scale is None or isinstance(options.scale, bool) or not np.isfinite(scale) or scale == 0:
-        raise SceneError(f"scale must be a finite number other than 0, got {brief(options.scale)}")
-    started = time.perf_counter()
+    scale, started = options.scale, time.perf_counter()
     file = mesh_loader.read_mesh(path, options.meshes)
     scene = Scene(path.stem, sources=[str(path)], notes=list(file.notes))
     names: dict[str, int] = {}

@@ -19,6 +19,7 @@ from collide.scenes.loaders import resources
 from collide.scenes.loaders.mesh_parts import MeshFile, MeshPart
 from collide.scenes.loaders.mesh_shapes import Taken, element_shapes, extent
 from collide.shapes.shape import mirrors
+from collide.transforms import FULL_TURN, rotation_from_rpy
 
 MISSING_MESHES = ("error", "skip")
 
@@ -107,6 +108,13 @@ class Reading:
         self.note_size(extent(meant, scale), place)
         self.spent.append(time.perf_counter() - started)
         return shapes
+
+    def rotation(self, rpy: np.ndarray, place: str) -> np.ndarray:
+        """(3, 3) of roll, pitch, yaw [rad]; angles beyond a full turn are noted, for they look like degrees."""
+        if np.abs(rpy).max() > FULL_TURN:
+            angles = " ".join(f"{angle:g}" for angle in rpy)
+            self.notes.append(f'{place}: rpy "{angles}" exceeds a full turn of radians: is it in degrees?')
+        return rotation_from_rpy(rpy)
 
     def note_size(self, extent: float, place: str) -> None:
         """Note a size [m] that looks like one of another unit."""

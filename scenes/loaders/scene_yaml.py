@@ -17,7 +17,7 @@ from collide.robots.robot import Robot
 from collide.scenes.description import Scene, SceneBody
 from collide.scenes.loaders import mjcf, resources, sdformat, shape_yaml, urdf
 from collide.scenes.loaders.documents import parse_document
-from collide.scenes.loaders.fields import Fields, did_you_mean, read_pose
+from collide.scenes.loaders.fields import Fields, did_you_mean, read_each, read_pose
 from collide.scenes.loaders.files import MAX_INCLUDED
 from collide.scenes.loaders.mesh_file import OPTIONS, MeshFile, read_mesh
 from collide.scenes.loaders.robot_yaml import inline_robot
@@ -103,8 +103,8 @@ def _build_into(building: _Building, data: Any) -> None:
         _include(building, entry, place)
     for entry, place in document.items("robots"):
         _add_robot(building, Fields(entry, building.path, place, _ROBOT))
-    for entry, place in document.items("bodies"):
-        _add_body(building, Fields(entry, building.path, place, _BODY))
+    bodies = (Fields(entry, building.path, place, _BODY) for entry, place in document.items("bodies"))
+    read_each(bodies, lambda body: _add_body(building, body))
     names = {body.name: None for body in scene.bodies}
     for entry, place in document.items("allow"):
         scene.allowed.append(_allowed_pair(document, entry, place, names))

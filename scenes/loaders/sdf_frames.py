@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from collide.errors import InvalidPose, cut, listing
-from collide.scenes.loaders.fields import placed, rotation_from_degrees
+from collide.scenes.loaders.fields import placed
 from collide.scenes.loaders.robot_reading import Reading
 from collide.transforms import inverse_pose, pose
 
@@ -158,8 +158,8 @@ def pose_of(element: ET.Element | None, place: str, reading: Reading) -> np.ndar
             return pose(numbers[:3], quat_xyzw=numbers[3:])
         numbers = reading.numbers(text, 6, "<pose>", place)
         if is_true(described.get("degrees", "false")):
-            return pose(numbers[:3], R=rotation_from_degrees(numbers[3:]))
-        return pose(numbers[:3], rpy=numbers[3:])
+            return pose(numbers[:3], rpy_deg=numbers[3:])
+        return pose(numbers[:3], R=reading.rotation(numbers[3:], f"{place} <pose>"))
     except InvalidPose as error:
         raise InvalidPose(placed(error, reading.path, f"{place} <pose>")) from None
 

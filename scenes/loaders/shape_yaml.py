@@ -203,7 +203,7 @@ def _cloud(fields: Fields, metres: float, files: Files) -> Described:
         return Described(PointCloud(points, 0.0 if radius is None else radius))
     if "points" in fields:
         fields.fail("'points' stands in place of a file: give one of them")
-    scale = fields.number("scale", 1.0)
+    scale = fields.scale()
     if not scale > 0.0:
         fields.fail(f"must be above 0, got {scale:g}", "scale")
     path = files.find(fields.text("file"), fields.place("file"))
@@ -253,7 +253,7 @@ def _mesh_scale(fields: Fields) -> np.ndarray:
     if isinstance(fields.get("scale"), list):
         scale = fields.numbers("scale", (3,))
     else:
-        scale = np.full(3, fields.number("scale", 1.0))
+        scale = np.full(3, fields.scale())
     if not scale.all():
         fields.fail(f"must not be 0, got {brief(fields.get('scale'))}", "scale")
     return scale

@@ -19,7 +19,7 @@ from collide.errors import InvalidPose, InvalidShape, SceneError, cut, listing
 from collide.robots.kinematic_tree import Joint, Mimic
 from collide.robots.robot import LinkShape, Robot
 from collide.scenes.description import free_name
-from collide.scenes.loaders.fields import placed
+from collide.scenes.loaders.fields import placed, read_each
 from collide.scenes.loaders.mesh_shapes import Taken
 from collide.scenes.loaders.robot_reading import BALL, Reading, chain, opened
 from collide.scenes.loaders.srdf import find_srdf, read_srdf
@@ -58,7 +58,8 @@ def _build(root: ET.Element, reading: Reading, srdf: Path | None) -> Robot:
     links = [_name(element, "link", k, reading) for k, element in enumerate(root.findall("link"))]
     if not links:
         reading.fail("<robot>", "has no <link>" + _advice(root))
-    geometry = {name: link_shapes(element, name, reading) for name, element in zip(links, root.findall("link"))}
+    elements = dict(zip(links, root.findall("link")))
+    geometry = dict(zip(links, read_each(links, lambda name: link_shapes(elements[name], name, reading))))
     taken = dict.fromkeys(links, 1)
     joints: list[Joint] = []
     for k, element in enumerate(root.findall("joint")):
@@ -140,7 +141,8 @@ def _origin(element: ET.Element, place: str, reading: Reading) -> np.ndarray:
         return np.eye(4)
     xyz = floats(origin, "xyz", 3, place, reading, "0 0 0")
     try:
-        return pose(xyz, rpy=floats(origin, "rpy", 3, place, reading, "0 0 0"))
+        rpy = floats(origin, "rpy", 3, place, reading, "0 0 0")
+        return pose(xyz, R=reading.rotation(rpy, f"{place} <origin>"))
     except InvalidPose as error:
         raise InvalidPose(placed(error, reading.path, f"{place} <origin>")) from None
 

@@ -538,6 +538,8 @@ EXCUSED = {
     "Shape.scaled": "asked of every shape",
     "transforms.refuse_no_pose": "only ever raises, of what a check found",
     "transforms.rotation_from_rpy": "its numbers are checked by `pose` and `poses`",
+    "transforms.rotation_from_degrees": "as rotation_from_rpy",
+    "transforms.refuse_degrees": "as rotation_from_rpy",
     "transforms.rotation_from_unit": "as rotation_from_rpy",
     "transforms.inverse_pose": "of poses that loaders and hosts have made",
     "How": "an enumeration of Python's own",

@@ -13,7 +13,6 @@ import pytest
 from collide import scenes
 from collide.errors import CollideError, InvalidArgument, InvalidPose, InvalidShape, MissingExtra, SceneError
 from collide.scenes import generators, load
-from collide.scenes.loaders.fields import rotation_from_degrees
 from collide.shapes import (
     Box,
     Capsule,
@@ -28,7 +27,7 @@ from collide.shapes import (
     Mesh,
     Sphere,
 )
-from collide.transforms import pose
+from collide.transforms import pose, rotation_from_degrees
 
 BALL = {"sphere": {"radius": 0.1}}
 ARM = {
@@ -518,3 +517,44 @@ def test_panda_workbench():
     assert 2 <= len(misses) <= 6
     touching = [names for names, row in near.items() if abs(row["distance"]) < 1e-9]
     assert len(touching) >= 10
+
+
+def test_all_damaged_files_of_a_scene_are_named_at_once(tmp_path):
+    (tmp_path / "good.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    for name in ("x.obj", "y.obj"):
+        (tmp_path / name).write_text("v 0 0 0\nf 1 2 3\n")
+    files = [tmp_path / name for name in ("x.obj", "good.obj", "y.obj", "absent.obj")]
+    urdf = "".join(
+        f'<link name="l{k}"><collision><geometry><mesh filename="{file.name}"/></geometry></collision></link>'
+        for k, file in enumerate(files)
+    ) + "".join(
+        f'<joint name="j{k}" type="fixed"><parent link="l0"/><child link="l{k}"/></joint>' for k in range(1, len(files))
+    )
+    (tmp_path / "r.urdf").write_text(f'<robot name="r">{urdf}</robot>')
+    bodies = [{"name": file.stem, "shape": {"mesh": {"file": file.name}}} for file in files]
+    (tmp_path / "s.json").write_text(json.dumps({"collide": 1, "bodies": bodies}))
+    for places in (files, [tmp_path / "r.urdf"], [tmp_path / "s.json"]):
+        with pytest.raises(SceneError) as caught:
+            load(*places)
+        assert len(caught.value.messages) == 3 and str(caught.value).startswith("3 complaints: ")
+        for name, message in zip(("x.obj", "y.obj", "absent.obj"), caught.value.messages):
+            assert name in message
+    with pytest.raises(SceneError) as caught:
+        load(files[0], files[1])
+    assert caught.value.messages == () and "x.obj" in str(caught.value)
+
+
+@pytest.mark.parametrize("ending", ["urdf", "sdf"])
+def test_angles_that_look_like_degrees_are_noted(tmp_path, ending):
+    geometry = "<geometry><sphere><radius>1</radius></sphere></geometry>"
+    text = {
+        "urdf": '<robot name="r"><link name="a"><collision><origin rpy="0 0 {}"/><geometry><sphere radius="1"/>'
+        "</geometry></collision></link></robot>",
+        "sdf": '<sdf version="1.9"><model name="r"><link name="a"><collision name="c"><pose>0 0 0 0 0 {}</pose>'
+        f"{geometry}</collision></link></model></sdf>",
+    }[ending]
+    for angle, is_noted in ((90, True), (6.2832, False)):
+        file = tmp_path / f"r.{ending}"
+        file.write_text(text.format(angle))
+        notes = load(file).notes
+        assert any(f'"0 0 {angle}" exceeds a full turn of radians: is it in degrees?' in n for n in notes) == is_noted
