@@ -410,6 +410,16 @@ COLLIDE_API collide_status collide_mesh_create(const double *vertices, size_t n,
    are curved otherwise, without end, or whose corners are rounded (collide_hpolytope). */
 COLLIDE_API collide_status collide_mesh_of_shape(const collide_shape *shape, collide_mesh **mesh);
 
+/* Terrain: heights over a grid and all below them down to a bottom, as a solid of the vertices and the faces of Python's HeightField,
+   in its order. heights : rows * columns of them, row by row [m]; heights[i * columns + j] stands at x = (j - (columns - 1) / 2) *
+   cell[0], y = (i - (rows - 1) / 2) * cell[1]. NaN makes a hole: cells with a corner there are left out. cell : sides of a cell along
+   x and y > 0 [m]. bottom : z of the bottom, below all heights; NULL: as far below the lowest as heights differ and the longer side
+   together. Facet 2 * (i * (columns - 1) + j) + t of a field without holes is triangle t of cell i, j. COLLIDE_INVALID_SHAPE: fewer
+   than 2 * 2 heights, none that makes a cell, heights or sides out of range, 2^27 cells or more, a bottom not below all heights.
+   O(rows * columns): what meshes of as many facets take. */
+COLLIDE_API collide_status collide_height_field_create(const double *heights, size_t rows, size_t columns, const double cell[2],
+                                                       const double *bottom, collide_mesh **mesh);
+
 /* Frees a mesh; NULL is fine. A mesh never changes and any number of threads may use it. */
 COLLIDE_API void collide_mesh_free(collide_mesh *mesh);
 

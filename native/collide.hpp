@@ -248,6 +248,13 @@ public:
     Mesh(Span<const double> vertices, Span<const std::int32_t> faces, int solid = COLLIDE_SOLID_IF_CLOSED)
         : Owner(made(collide_mesh_create, vertices.data(), rows(vertices, 3), faces.data(), rows(faces, 3), solid)) {}
     explicit Mesh(const Shape &shape) : Owner(made(collide_mesh_of_shape, shape.get())) {}
+    // Terrain: heights row by row, NaN in holes.   cell : its sides along x and y.
+    static Mesh height_field(Span<const double> heights, std::size_t columns, const std::array<double, 2> &cell) {
+        return Mesh(made(collide_height_field_create, heights.data(), rows(heights, columns), columns, cell.data(), nullptr));
+    }
+    static Mesh height_field(Span<const double> heights, std::size_t columns, const std::array<double, 2> &cell, double bottom) {
+        return Mesh(made(collide_height_field_create, heights.data(), rows(heights, columns), columns, cell.data(), &bottom));
+    }
 };
 
 class Field : public Owner<collide_field, collide_field_free> {

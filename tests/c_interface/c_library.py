@@ -151,6 +151,7 @@ _TYPES = {
     ],
     "collide_mesh_create": [c_void_p, c_size_t, c_void_p, c_size_t, c_int, c_void_p],
     "collide_mesh_of_shape": [c_void_p, c_void_p],
+    "collide_height_field_create": [c_void_p, c_size_t, c_size_t, c_void_p, c_void_p, c_void_p],
     "collide_mesh_free": [c_void_p],
     "collide_mesh_collide": [c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_uint, POINTER(c_int)],
     "collide_mesh_distance": [c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_uint, c_void_p],
@@ -307,11 +308,20 @@ def raw_mesh(vertices, faces, solid: int) -> tuple[int, int | None]:
     return status, out.value
 
 
+def raw_height_field(heights, cell, bottom: float | None) -> tuple[int, int | None]:
+    """(status, handle) of a mesh of terrain."""
+    heights, cell = _doubles(heights), _doubles(np.broadcast_to(cell, 2))
+    below = None if bottom is None else _doubles([bottom])
+    return raw_shape("collide_height_field_create", heights, *heights.shape, cell, below)
+
+
 class CMesh:
     """A mesh, or a convex shape, of Python made once more in C, to be asked about as facets."""
 
     def __init__(self, shape: collide.Shape):
-        if isinstance(shape, collide.Mesh):
+        if isinstance(shape, collide.HeightField):
+            status, self.handle = raw_height_field(shape.heights, shape.cell, shape.bottom)
+        elif isinstance(shape, collide.Mesh):
             status, self.handle = raw_mesh(shape.vertices, shape.faces, SOLID if shape.solid else SURFACE)
         else:
             convex = CShape(shape)  # held until the mesh is made

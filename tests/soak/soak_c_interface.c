@@ -209,6 +209,13 @@ static collide_status make_mesh(stream *s, const collide_shape *shape, collide_m
     int32_t faces[3 * 200];
     size_t n, m, k, i;
     if (one_in(s, 4)) return collide_mesh_of_shape(shape, mesh);
+    if (one_in(s, 4)) { /* terrain, some of it with holes */
+        size_t columns = 1 + below(s, 9);
+        double cell[2] = {0.5 * length(s), 0.5 * length(s)}, bottom = -coordinate(s, 2.0);
+        n = one_in(s, 40) ? below(s, 3) : 2 + below(s, 9);
+        for (k = 0; k < n * columns; k++) vertices[k] = one_in(s, 60) ? (double)NAN : coordinate(s, 0.4);
+        return collide_height_field_create(vertices, n, columns, cell, one_in(s, 2) ? NULL : &bottom, mesh);
+    }
     if (one_in(s, 2)) {
         for (k = 0; k < 18; k++) vertices[k] = k / 6 == k % 3 ? (k / 3 % 2 ? -1.0 : 1.0) * length(s) : 0.0;
         memcpy(faces, octahedron, sizeof octahedron);
