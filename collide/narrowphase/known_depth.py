@@ -15,3 +15,7 @@ class Depth(NamedTuple):
     proven: float
     normal: np.ndarray
     least: float
+
+    def at_least(self, least: float) -> Depth:
+        """The same with a lower bound of ``least`` [m], or of the one known, where this is larger."""
+        return self._replace(least=min(max(self.least, least), self.proven))

@@ -71,8 +71,8 @@ def halfspace(normal, offset: float) -> Convex:
     return _set(lambda N: np.where(N @ normal > 1 - 1e-12, offset, np.inf), [normal])
 
 
-def hull(points: np.ndarray) -> Convex:
-    return _set(lambda N: (N @ np.asarray(points).T).max(axis=1))
+def hull(points, normals=()) -> Convex:
+    return _set(lambda N: (N @ np.asarray(points).T).max(axis=1), normals)
 
 
 def sphere_points(n: int) -> np.ndarray:

@@ -51,8 +51,10 @@ _NARROWEST = 2.0**-24
 def least_depth(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, known: Depth) -> Depth:
     """The depth of two overlapping bodies of convex parts at poses (4, 4), no worse than a known depth: the known depth
     itself where both bodies have half-spaces, since two half-spaces overlap without end."""
+    if known.least >= known.proven * (1.0 - TOLERANCE):
+        return known
     pairs = _Pairs(A, B, X_WA, X_WB, known)
-    return known if pairs.unbounded or not known.least < known.proven * (1.0 - TOLERANCE) else pairs.searched(known)
+    return known if pairs.unbounded else pairs.searched(known)
 
 
 def key_of(shape: Shape) -> bytes:
@@ -133,7 +135,7 @@ class _Pairs:
             cells = np.concatenate(refused)
             if not len(cells):
                 break
-        return best._replace(least=min(max(best.least, least), best.proven))
+        return best.at_least(least)
 
     def _cut(self, best: Depth, rays: _Rays, cells: np.ndarray) -> tuple[Depth, list[_Covered]]:
         """Cones cut until each is covered as far as the shortest way known, or rays run out."""

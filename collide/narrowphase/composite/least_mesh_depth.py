@@ -17,6 +17,7 @@ where the bodies are proven apart.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -35,9 +36,9 @@ from collide.narrowphase.known_depth import Depth
 from collide.results import UNDECIDED
 from collide.shapes.shape import Shape
 
-#: Balls of a body that are paired with balls of the next: so many of the largest, and of the rest; pairs of parts whose
-#: common points are looked at.
-_LARGEST, _OTHERS, _PAIRS = 800, 200, 6
+#: Balls of a body that are paired with balls of the next: so many of the largest, and of the rest, of so many parts;
+#: pairs of parts whose common points are looked at.
+_LARGEST, _OTHERS, _PARTS, _PAIRS = 800, 200, 12, 6
 #: Radius of the ball in a half-space, in lengths L of the shortest translation known: within L of 0 the ball is nowhere
 #: farther than 2⁻¹³ L from the plane.
 _OF_PLANE = 2.0**12
@@ -51,21 +52,16 @@ def key_of(shape: Shape) -> bytes:
 def least_depth(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, known: Depth) -> Depth:
     """The depth of two overlapping bodies at poses (4, 4), no worse than a known one."""
     a, b = compound_parts(A), compound_parts(B)
-    if (a.unbounded and b.unbounded) or known.proven <= known.least * (1.0 + 2.0**-10):
+    if a.unbounded and b.unbounded:
         return known
     planes = _planes(a, b, X_WA, X_WB)
-    known = _raised(known, max(_of_parts(a, b, X_WA, X_WB), float(planes[:, 3].max(initial=0.0))))
-    known = _raised(known, _of_convex_parts(a, b, X_WA, X_WB))
+    known = known.at_least(float(planes[:, 3].max(initial=0.0)))
+    known = known.at_least(max(_of_parts(a, b, X_WA, X_WB), _of_convex_parts(a, b, X_WA, X_WB)))
     with leaving_touching_open():
         known = shorter_depth(meets(a, b), X_WA, X_WB, known)
     balls = _balls(a, X_WA, b, X_WB, known.proven), _balls(b, X_WB, a, X_WA, known.proven)
     size = a.radius + b.radius + float(np.abs(X_WA[:3, 3]).max() + np.abs(X_WB[:3, 3]).max())
-    return _raised(known, depth_of_balls(*balls, size, known.proven, _balls_in_planes(planes, known.proven)))
-
-
-def _raised(known: Depth, least: float) -> Depth:
-    """A depth with a lower bound no less than ``least`` [m]."""
-    return known._replace(least=min(max(known.least, least), known.proven))
+    return known.at_least(depth_of_balls(*balls, size, known.proven, _balls_in_planes(planes, known.proven)))
 
 
 def _planes(A: CompoundParts, B: CompoundParts, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
@@ -142,10 +138,16 @@ def _of_convex_parts(A: CompoundParts, B: CompoundParts, X_WA: np.ndarray, X_WB:
 def _balls(of: CompoundParts, X_W: np.ndarray, near: CompoundParts, X_WN: np.ndarray, length: float) -> np.ndarray:
     """(k, 4) balls in the world within the parts of a body, near a body moved by less than ``length``: the largest, and
     some others. A slop shrinks balls, below 0 where points are unsure: two of them meet by the sum of radii."""
-    balls = np.concatenate([np.zeros((0, 4)), *(balls for part in of.parts for balls in _balls_of_part(part, X_W))])
+    low, high = np.full(3, -math.inf), np.full(3, math.inf)
     if not near.unbounded:
         ends = near.boxes(X_WN[None])[0]
         low, high = ends[:, :3].min(axis=0), ends[:, 3:].max(axis=0)
+    some = np.flatnonzero(np.isnan(of.columns.plane))
+    boxes = of.boxes(X_W[None], some)[0]
+    gaps = np.maximum(low - boxes[:, 3:], boxes[:, :3] - high).max(axis=1)
+    nearest = some[np.argsort(gaps, kind="stable")[:_PARTS]]
+    balls = np.concatenate([np.zeros((0, 4)), *(b for k in nearest for b in _balls_of_part(of.parts[k], X_W))])
+    if not near.unbounded:
         away = np.maximum(np.maximum(low - balls[:, :3], balls[:, :3] - high), 0.0)
         balls = balls[np.sqrt(np.square(away).sum(axis=1)) <= length + np.maximum(balls[:, 3], 0.0)]
     order = np.argsort(-balls[:, 3], kind="stable")

@@ -81,7 +81,7 @@ def body_within(shape: Shape) -> Body | None:
     found."""
     if is_halfspace(shape):
         return None
-    return body_of(shape) if has_facets(shape) else enclosure_of(shape).inner
+    return body_of(shape) if shape.is_field or has_facets(shape) else enclosure_of(shape).inner
 
 
 def distances_within(body: Body, X: np.ndarray, points: np.ndarray) -> np.ndarray:

@@ -39,19 +39,12 @@ def key_of(shape: Shape) -> tuple:
 
 def least_depth(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, known: Depth) -> Depth:
     """The depth of two overlapping bodies of facets at poses (4, 4), no worse than a known one."""
-    if known.proven <= known.least * (1.0 + 2.0**-10):
-        return known
-    return _least(body_of(A), body_of(B), X_WA, X_WB, known)
-
-
-def _least(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray, known: Depth) -> Depth:
-    least = known.least
-    if A.solid and B.solid:
-        least = min(max(least, largest_sum(A, B, X_WA, X_WB)), known.proven)
-    known = shorter_depth(lambda X, Y: hits(A, B, X, Y), X_WA, X_WB, known._replace(least=least))
-    if A.solid and B.solid and known.least * _NARROW < known.proven:
-        least = depth_of_solids(A.shape, B.shape, X_WA, X_WB, known.proven)
-        known = known._replace(least=min(max(known.least, least), known.proven))
+    a, b = body_of(A), body_of(B)
+    if a.solid and b.solid:
+        known = known.at_least(largest_sum(a, b, X_WA, X_WB))
+    known = shorter_depth(lambda X, Y: hits(a, b, X, Y), X_WA, X_WB, known)
+    if a.solid and b.solid and known.least * _NARROW < known.proven:
+        known = known.at_least(depth_of_solids(A, B, X_WA, X_WB, known.proven))
     return known
 
 
