@@ -54,6 +54,8 @@ def joined_sides(
     Only edges of cut facets, and edges of other than two sheets, are visited: other edges join whole facets of a part.
     Parameters as of `cells.cells_of`.
     """
+    if not is_cut.any() and not any(len(of_body.odd) for of_body in points.facets.edges):
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
     edges = _half_edges(sheets, points, is_cut)
     leaves = 2 * edges.sheet + ~edges.upward
     enters = leaves ^ 1

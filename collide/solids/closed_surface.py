@@ -228,11 +228,16 @@ def push_all(surface, movable_only):
 
 
 @kernel
-def cancel(surface, vertex):
-    """Remove pairs of triangles of opposite sense with the same corners at a vertex."""
+def cancel(surface, vertex, only_lowest):
+    """Remove pairs of triangles of opposite sense with the same corners at a vertex.   only_lowest : look only at
+    triangles whose lowest vertex this is: enough where all vertices are asked, in order.
+    """
     c = surface.first[vertex]
     while c >= 0:
         p, q = vertex_after(surface, c), vertex_before(surface, c)
+        if only_lowest and (p < vertex or q < vertex):
+            c = surface.following[c]
+            continue
         d = surface.first[vertex]
         while d >= 0 and not (vertex_after(surface, d) == q and vertex_before(surface, d) == p):
             d = surface.following[d]
@@ -315,7 +320,7 @@ def merge(surface, size, u, w):
             _unlink(surface, c)
             _link(surface, c, w)
         c = following
-    cancel(surface, w)
+    cancel(surface, w, False)
     return push(surface, size, w)
 
 
@@ -352,5 +357,5 @@ def open_surface(header, reach):
     for c in range(3 * surface.counts[N_TRIANGLES]):
         _link(surface, c, surface.corners[c])
     for v in range(surface.counts[N_VERTICES]):
-        cancel(surface, v)
+        cancel(surface, v, True)
     return surface

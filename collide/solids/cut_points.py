@@ -172,11 +172,14 @@ class CutPoints:
 
     def in_order(self, some: Iterable[int], u: int, v: int) -> list[int]:
         """Points by coordinate u, then v."""
+        near = {p: self.near(p)[u] for p in some}
+        if len(set(near.values())) == len(near):  # rounding keeps the order
+            return sorted(near, key=near.__getitem__)
 
         def compare(a: int, b: int) -> int:
             return self.before(a, b, u, v)
 
-        return sorted(some, key=cmp_to_key(compare))
+        return sorted(near, key=cmp_to_key(compare))
 
     def in_world(self, point: int) -> tuple[float, float, float]:
         """Coordinates in W, each rounded once to the nearest double [m]."""

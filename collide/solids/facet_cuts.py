@@ -12,10 +12,12 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from collide.kernels import address_of
 from collide.solids.cut_points import CutPoints, Rational, axis_of, reduced
 from collide.solids.cut_segments import CutSegments
 from collide.solids.limits import UNLIMITED, Limits
 from collide.solids.placed_facets import PlacedFacets
+from collide.solids.segment_kernels import points_on_segments
 from collide.surface_queries.overlay import common_piece
 
 Segment = tuple[int, int]
@@ -152,19 +154,14 @@ class FacetCuts:
     def _candidates(self, f: int, u: int, v: int) -> Iterable[tuple[Segment, int]]:
         """Segments and points of a facet that may lie within them, by doubles."""
         segments, points = list(self.segments_of[f]), list(self.points_of[f])
-        near = np.array([self.points.near(p) for p in points])[:, (u, v)]
+        near = np.array([self.points.near(p) for p in points])
         row = {p: k for k, p in enumerate(points)}
         ends = np.array([(row[p], row[q]) for p, q in segments])
-        a, b = near[ends[:, 0], None], near[ends[:, 1], None]
-        with np.errstate(all="ignore"):
-            inside = ((near >= np.minimum(a, b)) & (near <= np.maximum(a, b))).all(axis=2)
-            inside[np.arange(len(segments))[:, None], ends] = False
-            k, p = np.nonzero(inside)
-            a, e, w = a[k, 0], (b - a)[k, 0], near[p] - a[k, 0]
-            height = np.abs(e[:, 0] * w[:, 1] - e[:, 1] * w[:, 0])
-            size = np.maximum(np.abs(e).max(axis=1), np.abs(w).max(axis=1))
-            near_enough = ~(height > 2.0**-47 * size * (np.abs(a).max(axis=1) + size))
-        for i, j in zip(k[near_enough].tolist(), p[near_enough].tolist()):
+        pairs = np.empty((len(segments) * len(points), 2), dtype=np.int64)
+        count = points_on_segments(
+            address_of(near), len(near), address_of(ends), len(ends), u, v, address_of(pairs), len(pairs)
+        )
+        for i, j in pairs[:count].tolist():
             if points[j] not in self.splits[segments[i]]:
                 yield segments[i], points[j]
 

@@ -111,7 +111,7 @@ def _split_behind(surface, size, c, behind, height):
     put(surface, s, p, a, d, surface.sources[t], surface.plane[t])
     put(surface, t, b, p, d, surface.sources[t], surface.plane[t])
     note_shift(surface, t, p, height)
-    cancel(surface, p)
+    cancel(surface, p, False)
     return size
 
 
@@ -138,6 +138,25 @@ def _tidy(surface, size, vertex, with_thin):
                 return True, _split_behind(surface, size, longest, behind, height)
         c = surface.following[c]
     return False, size
+
+
+@kernel
+def _needs_tidying(surface):
+    """Whether a triangle has a short edge or is thin, or nearly: squares are off by less than 2⁻⁴⁰ of themselves."""
+    limit = surface.reach * surface.reach * (1.0 + 2.0**-40)
+    for t in range(surface.counts[N_TRIANGLES]):
+        i = surface.corners[3 * t]
+        if i < 0:
+            continue
+        a = vec3_at(surface.points, 3 * i)
+        b = vec3_at(surface.points, 3 * surface.corners[3 * t + 1])
+        c = vec3_at(surface.points, 3 * surface.corners[3 * t + 2])
+        ab, bc, ca = sub(b, a), sub(c, b), sub(a, c)
+        n = cross(ab, ca)
+        x, y, z = dot(ab, ab), dot(bc, bc), dot(ca, ca)
+        if min(x, y, z) <= limit or dot(n, n) <= limit * max(x, y, z):
+            return True
+    return False
 
 
 @kernel
@@ -401,7 +420,7 @@ def _take_away(surface, vertex):
     if made > of_first:
         surface.held[ring.triangles[of_first]] = held_too
     for k in range(n):
-        cancel(surface, ring.points[k])
+        cancel(surface, ring.points[k], False)
     return n
 
 
@@ -427,8 +446,9 @@ def _thin_out(surface):
 def _simplify(surface):
     """Until there are no short edges, no thin triangles and no needless vertices."""
     while True:
-        tidy_all(surface, False)
-        tidy_all(surface, True)
+        if _needs_tidying(surface):
+            tidy_all(surface, False)
+            tidy_all(surface, True)
         if _thin_out(surface) == 0:
             return
 

@@ -250,8 +250,8 @@ def _flip(surface, p, q):
     remove(surface, t)
     put(surface, s, r, p, o, source, plane)
     put(surface, t, o, q, r, source_behind, plane_behind)
-    cancel(surface, r)
-    cancel(surface, o)
+    cancel(surface, r, False)
+    cancel(surface, o, False)
     return True
 
 
@@ -281,7 +281,7 @@ def split_edge(surface, p, q, x):
                 surface.counts[N_TRIANGLES] += 1
             c = half_edge(surface, p, q)
         p, q = q, p
-    cancel(surface, x)
+    cancel(surface, x, False)
     return True
 
 
@@ -347,5 +347,5 @@ def _split_facet(surface, t, x):
     put(surface, new, j, k, x, source, plane)
     put(surface, new + 1, k, i, x, source, plane)
     surface.counts[N_TRIANGLES] += 2
-    cancel(surface, x)
+    cancel(surface, x, False)
     return True

@@ -12,9 +12,14 @@ import numpy as np
 
 from collide.kernels import address_of, entry, kernel, view_f64, view_i64
 from collide.mesh.bvh import CENTRE, EXPONENT, NODE, WIDTH, MeshTree, box_at, open_tree
+from collide.numerics.vec3 import add, component, cross, divide, max_abs, put_vec3, scale, sub, vec3_at
 
 #: Answers of a facet: number of passages, or open in doubles.
 _OPEN = 2
+#: Integers of a ray that starts within a facet, as of `aim_rays`.
+AIM = 5
+#: More than what underflows in a normal.
+_TINY = 1e-290
 
 
 def count_passages(
@@ -107,6 +112,44 @@ def _passage(T, at, X, points, k, axis, slack):
     if height > of_height:
         return sense
     return 0 if height < -of_height else _OPEN
+
+
+@entry("void(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)")
+def aim_rays(
+    places_at, n_places, corners_at, n_facets, rows_at, triangles_at, n, attempt, points_at, aims_at
+):
+    """Points within triangles of facets to start rays at, and axes that the facets look along.
+
+    places : (n_places, 3) vertices, rounded.   corners : (F, 3).   rows : (n,) facets.   triangles : (n, 9), rounded.
+    points : out, (n, 3).   aims : out, (n, AIM), the axis, 1 or −1 as the front looks up or down, 0 where that is open,
+    and weights of the corners, other ones at another attempt.
+
+    Corners are off by a unit u M of their size M, edges below L by 4u M, normals by 2 (2L 4u M) and rounding, less than
+    32u M L. Points are off by as much as corners, and by a product, two sums and a quotient of positive shares: by less
+    than six units, as vertices worked out in doubles, whose slack is 32 units of no less than M.
+    """
+    places, corners = view_f64(places_at, 3 * n_places), view_i64(corners_at, 3 * n_facets)
+    rows, triangles = view_i64(rows_at, n), view_f64(triangles_at, 9 * n)
+    points, aims = view_f64(points_at, 3 * n), view_i64(aims_at, AIM * n)
+    for k in range(n):
+        f = 3 * rows[k]
+        p, q = vec3_at(places, 3 * corners[f]), vec3_at(places, 3 * corners[f + 1])
+        r = vec3_at(places, 3 * corners[f + 2])
+        u, v = sub(q, p), sub(r, p)
+        normal = cross(u, v)
+        axis = 0
+        for i in range(1, 3):
+            axis = i if abs(component(normal, i)) > abs(component(normal, axis)) else axis
+        limit = 2.0**-48 * max(max_abs(p), max_abs(q), max_abs(r)) * max(max_abs(u), max_abs(v)) + _TINY
+        height = component(normal, axis)
+        aims[AIM * k] = axis
+        aims[AIM * k + 1] = 0 if not abs(height) > limit else (1 if height > 0.0 else -1)
+        first, second = 1 + (389 * (k + 1) + 211 * attempt) % 1021, 1 + (613 * (k + 1) + 503 * attempt) % 1021
+        third = 1 + (797 * (k + 1) + 97 * attempt) % 1021
+        aims[AIM * k + 2], aims[AIM * k + 3], aims[AIM * k + 4] = first, second, third
+        a, b, c = vec3_at(triangles, 9 * k), vec3_at(triangles, 9 * k + 3), vec3_at(triangles, 9 * k + 6)
+        total = add(add(scale(float(first), a), scale(float(second), b)), scale(float(third), c))
+        put_vec3(points, 3 * k, divide(total, float(first + second + third)))
 
 
 @entry("int64(int64, int64, int64, int64, int64, int64, float64, int64, int64, int64, int64, int64)")

@@ -5,16 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from collide.errors import CollideError
+from collide.kernels import address_of
 from collide.numerics.exact_vectors import inner
 from collide.solids.around_edges import Sheets
 from collide.solids.cut_points import CutPoints, Rational
 from collide.solids.placed_facets import PlacedFacets
-from collide.solids.ray_passages import count_passages
+from collide.solids.ray_passages import AIM, aim_rays, count_passages
 from collide.solids.rounded_points import near_points, rounded_points
 
 _MAX_TRIES = 64
-#: More than what underflows in a normal.
-_TINY = 1e-290
 
 
 def shoot(sheets: Sheets, points: CutPoints, rows: np.ndarray, sides: np.ndarray) -> list[tuple[int, np.ndarray]]:
@@ -43,47 +42,32 @@ def shoot(sheets: Sheets, points: CutPoints, rows: np.ndarray, sides: np.ndarray
 
 
 class _Starts:
-    """Points within sheets (k,), and axes of rays: points in doubles, and exact for those asked for.
+    """Points within sheets (k,), in doubles and on demand exact, and axes of rays from the points.
 
-    place : (k, 3) in W [m].   facet : (k,) rows.   axes, upwards : (k,) as of `_axes`.
+    place : (k, 3) in W [m].   facet : (k,) rows.   axes : (k,) along which the facets are seen nearly largest.
+    upwards : (k,) bool, facets whose fronts look up the axis.
     """
 
     def __init__(self, sheets: Sheets, points: CutPoints, rows: np.ndarray, attempt: int):
         self._points, self._triangles, self.facet = points, sheets.triangles[rows], sheets.facet[rows]
-        self.axes, self.upwards = _axes(points, self.facet)
-        number = np.arange(1, len(rows) + 1)[:, None]
-        self._weights = 1 + (np.array([389, 613, 797]) * number + np.array([211, 503, 97]) * attempt) % 1021
-        # Corners are off by one unit of M at most, the largest size; a product, two sums and a quotient of positive
-        # shares by five: `slack` is 32 units of no less than M, of which vertices take six and differences one.
-        corners = rounded_points(points, self._triangles.ravel())[0].reshape(-1, 3, 3)
-        self.place = (corners * self._weights[:, :, None]).sum(axis=1) / self._weights.sum(axis=1, keepdims=True)
+        facets, k = points.facets, len(rows)
+        self.place, aims = np.empty((k, 3)), np.empty((k, AIM), dtype=np.int64)
+        places, corners = near_points(points).place, rounded_points(points, self._triangles.ravel())[0]
+        aim_rays(
+            address_of(places), len(places), address_of(facets.corners), len(facets.corners), address_of(self.facet),
+            address_of(corners), k, attempt, address_of(self.place), address_of(aims),
+        )
+        self.axes, self.upwards, self._weights = aims[:, 0].copy(), aims[:, 1] > 0, aims[:, 2:]
+        for row in np.flatnonzero(aims[:, 1] == 0).tolist():
+            normal = facets.normal(int(self.facet[row]))
+            self.axes[row] = _largest(normal)
+            self.upwards[row] = normal[self.axes[row]] > 0
 
     def exact(self, k: int) -> Rational:
         """Point number k."""
         corners = self._triangles[k].tolist()
         self._points.load(corners)
         return _within([self._points.exact(p) for p in corners], self._weights[k].tolist())
-
-
-def _axes(points: CutPoints, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """((k,) axes along which facets are seen nearly largest, (k,) bool: facets whose fronts look up the axis).
-
-    With corners off by a unit u M of their size M, edges below L are off by 4u M, and normals by 2 (2L 4u M) and
-    rounding: less than 32u M L.
-    """
-    facets = points.facets
-    corners = near_points(points).place[facets.corners[rows]]
-    edges = corners[:, 1:] - corners[:, :1]
-    normals = np.cross(edges[:, 0], edges[:, 1])
-    axes = np.abs(normals).argmax(axis=1)
-    height = normals[np.arange(len(rows)), axes]
-    limit = 2.0**-48 * np.abs(corners).max(axis=(1, 2)) * np.abs(edges).max(axis=(1, 2)) + _TINY
-    upwards = height > 0.0
-    for k in np.flatnonzero(~(np.abs(height) > limit)).tolist():
-        n = facets.normal(int(rows[k]))
-        axes[k] = _largest(n)
-        upwards[k] = n[axes[k]] > 0
-    return axes, upwards
 
 
 def _largest(normal) -> int:

@@ -106,3 +106,33 @@ def cross_segments(
                     where[4 * count + 3] = far_off + 4.0 * off + 4.0 * _U * largest
                     count += 1
     return count
+
+
+@entry("int64(int64, int64, int64, int64, int64, int64, int64, int64)")
+def points_on_segments(near_at, n, ends_at, n_segments, u, v, pairs_at, capacity):
+    """The number of pairs of a segment and a point of a facet, the point perhaps within the segment; no pair is lost.
+
+    near : (n, 3) points, rounded.   ends : (n_segments, 2) of them.   u, v : the axes across the view.
+    pairs : out, (capacity, 2), segments in order.   capacity : all pairs. O(capacity).
+
+    Rounding keeps the order of coordinates, and twice the area of three points seen along an axis is off by less than
+    2⁻⁴⁷ D (M + D): differences D of coordinates below M + D, each rounded, are off by a unit of that.
+    """
+    near, ends = view_f64(near_at, 3 * n), view_i64(ends_at, 2 * n_segments)
+    pairs = view_i64(pairs_at, 2 * capacity)
+    count = 0
+    for k in range(n_segments):
+        i, j = ends[2 * k], ends[2 * k + 1]
+        ax, ay, bx, by = near[3 * i + u], near[3 * i + v], near[3 * j + u], near[3 * j + v]
+        ex, ey = bx - ax, by - ay
+        for p in range(n):
+            x, y = near[3 * p + u], near[3 * p + v]
+            is_within = min(ax, bx) <= x <= max(ax, bx) and min(ay, by) <= y <= max(ay, by)
+            if not is_within or p == i or p == j:
+                continue
+            wx, wy = x - ax, y - ay
+            size = max(abs(ex), abs(ey), abs(wx), abs(wy))
+            if not abs(ex * wy - ey * wx) > 2.0**-47 * size * (max(abs(ax), abs(ay)) + size):
+                pairs[2 * count], pairs[2 * count + 1] = k, p
+                count += 1
+    return count
