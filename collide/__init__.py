@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from collide.certificates.verify import verify
     from collide.contact.contact_query import contacts
     from collide.contact.contact_rows import Contacts
+    from collide.derivatives.pair_derivatives import PairDerivatives
+    from collide.derivatives.uniqueness import Uniqueness
     from collide.errors import (
         CollideError,
         InvalidArgument,
@@ -137,6 +139,8 @@ _HOMES = {
     "collide.papers.partitions.convex_parts": ("ConvexParts",),
     "collide.papers.partitions.portals": ("Portals",),
     "collide.papers.partitions.space_partition": ("Located", "PartitionSize", "SpacePartition"),
+    "collide.derivatives.pair_derivatives": ("PairDerivatives",),
+    "collide.derivatives.uniqueness": ("Uniqueness",),
     "collide.pairs.query": ("collide", "distance"),
     "collide.pose_arrays": ("poses",),
     "collide.results": ("How", "PairResult", "WorldResult"),
@@ -184,12 +188,12 @@ __all__ = [
     "ConfigurationObstacle", "Contacts", "ConvexCells", "ConvexHull", "ConvexParts", "ConvexPolygon", "Cylinder",
     "DrawnConfigurations", "Ellipsoid", "EnclosingSpheres", "FacetPairs", "GridDistances", "HPolytope", "Halfspace",
     "HeightField", "How", "InvalidArgument", "InvalidPose", "InvalidShape", "LinkPair", "Located", "Mesh",
-    "MissingExtra", "MotionPlan", "OcTree", "OcTreeLeaves", "OverlapVolume", "Overlay", "PairResult",
+    "MissingExtra", "MotionPlan", "OcTree", "OcTreeLeaves", "OverlapVolume", "Overlay", "PairDerivatives", "PairResult",
     "PartitionSize", "PieceAudit", "PlanarObstacle", "Plane", "PointCloud", "Portals", "Proposal", "RayHits",
     "RepairedMesh", "Robot", "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions", "Shape",
     "ShapeCasts", "ShapeSet", "SignedDistanceGrid", "SignedDistances", "SpacePartition", "Sphere", "Spline",
-    "SweepResults", "SweptMesh", "TetMesh", "TimeOfImpact", "UnknownBody", "UnsupportedQuery", "VoxelGrid", "World",
-    "WorldHits", "WorldResult", "audit_pieces", "boolean", "certify", "collide", "combine",
+    "SweepResults", "SweptMesh", "TetMesh", "TimeOfImpact", "Uniqueness", "UnknownBody", "UnsupportedQuery",
+    "VoxelGrid", "World", "WorldHits", "WorldResult", "audit_pieces", "boolean", "certify", "collide", "combine",
     "configuration_obstacle", "contacts", "contains", "distance", "enclosing_spheres", "facet_pairs", "get_include",
     "get_library", "moved_poses", "overlap_volume", "overlapping_cells", "overlay", "plan", "pose", "poses",
     "poses_in_motion", "propose_disabled_pairs", "raycast", "read_sweep", "repaired", "self_collisions",

@@ -234,7 +234,7 @@ class PairResult(Generic[Form]):
         """Result k of a batch, or a batch of those in a slice. Raises IndexError, InvalidArgument."""
         if isinstance(k, slice):
             return PairResult(self.rows[k], False, _questions_at(self.question, k), self._certify)
-        k = _row_number(k, len(self.rows))
+        k = row_number(k, len(self.rows))
         return PairResult(self.rows[k : k + 1], True, question_of_row(self.question, k), self._certify)
 
     if not TYPE_CHECKING:  # checkers are to know the fields above, and no others
@@ -317,7 +317,7 @@ def _questions_at(question: Question, rows: slice) -> Question:
     return A, B, X_WA, X_WB
 
 
-def _row_number(k, count: int) -> int:
+def row_number(k, count: int) -> int:
     try:
         return range(count)[k + 0]
     except IndexError:
@@ -362,7 +362,7 @@ class WorldResult:
         ------
         IndexError, InvalidArgument
         """
-        row = self.rows[_row_number(k, len(self.rows))]
+        row = self.rows[row_number(k, len(self.rows))]
         a, b = self._bodies[int(row["a"])], self._bodies[int(row["b"])]
         return PairResult(row.reshape(1), True, (a.shape, b.shape, a.X_WB[None], b.X_WB[None]), self._certify)
 

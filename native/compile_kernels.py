@@ -62,6 +62,7 @@ APPLE = (Level("arm64", "apple-m1"),)
 #: together. Those that take longest are lowered first; two that share much not at once, or both would lower it.
 UNITS = {
     "convex": ("narrowphase.",),
+    "derivatives": ("derivatives.",),
     "papers": ("papers.", "least_distance."),
     "contacts": ("contact.",),
     "facets": ("narrowphase.facets.",),

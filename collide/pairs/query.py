@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, overload
+from functools import partial
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from collide.base import argument_checks as checks
 from collide.base.array_libraries import library_of, to_library
 from collide.base.threads import check_threads
 from collide.certificates.make_certificate import certify
+from collide.derivatives.pair_derivatives import PairDerivatives
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.lowering.kind_of_shape import kind_of
 from collide.narrowphase.convex_batches import Question
@@ -176,18 +178,31 @@ def _with_axes(A, B, X_WA, X_WB, check_poses: bool, threads: int, axes):
 def distance(
     A: Shape, B: Shape, X_WA: Pose, X_WB: Pose, *, max_distance: float = ..., signed: bool = ...,
     check_poses: bool = ..., threads: int = ..., algorithm: str | None = ..., depth: DepthSearch = ...,
-    like: None = ...,
+    like: None = ..., derivatives: Literal[False] = ...,
 ) -> PairResult[Single]: ...
 @overload
 def distance(
     A: Shapes, B: Shapes, X_WA: PoseLike, X_WB: PoseLike, *, max_distance: float = ..., signed: bool = ...,
     check_poses: bool = ..., threads: int = ..., algorithm: str | None = ..., depth: DepthSearch = ...,
-    like: None = ...,
+    like: None = ..., derivatives: Literal[False] = ...,
 ) -> PairResult: ...
+@overload
+def distance(
+    A: Shape, B: Shape, X_WA: Pose, X_WB: Pose, *, derivatives: Literal[True], max_distance: float = ...,
+    signed: bool = ..., check_poses: bool = ..., threads: int = ..., algorithm: str | None = ...,
+    depth: DepthSearch = ..., like: None = ...,
+) -> PairDerivatives[Single]: ...
+@overload
+def distance(
+    A: Shapes, B: Shapes, X_WA: PoseLike, X_WB: PoseLike, *, derivatives: Literal[True], max_distance: float = ...,
+    signed: bool = ..., check_poses: bool = ..., threads: int = ..., algorithm: str | None = ...,
+    depth: DepthSearch = ..., like: None = ...,
+) -> PairDerivatives: ...
 @overload
 def distance(
     A: Shapes, B: Shapes, X_WA: PoseLike, X_WB: PoseLike, *, max_distance: float = ..., signed: bool = ...,
     check_poses: bool = ..., threads: int = ..., algorithm: str | None = ..., depth: DepthSearch = ..., like: Any,
+    derivatives: bool = ...,
 ) -> Any: ...
 @asks_prepared_pairs(prepare_pair, PairResult, certify)
 def distance(
@@ -203,6 +218,7 @@ def distance(
     algorithm=None,
     depth="quick",
     like=None,
+    derivatives=False,
 ):
     """Signed distance of A and B, with witness points, normal and a proven bracket.
 
@@ -230,10 +246,13 @@ def distance(
         in the median, in 0.5 s). Not with an algorithm. All other rows are the same.
     like : str or array, optional
         As of `collide`: fields are arrays of the library, as by `PairResult.to`.
+    derivatives : bool
+        Whether the answer has derivatives by both poses as well (docs/derivatives.md). The rows are the same. Overlaps
+        of convex cores are asked twice.
 
     Returns
     -------
-    PairResult
+    PairResult, with derivatives `PairDerivatives`
         Scalars for single poses, arrays with a leading N otherwise. Lengths in metres, vectors in W.
 
     Raises
@@ -259,9 +278,13 @@ def distance(
         library_of(like)
         result = distance(
             A, B, X_WA, X_WB, max_distance=max_distance, signed=signed, check_poses=check_poses, threads=threads,
-            algorithm=algorithm, depth=depth,
+            algorithm=algorithm, depth=depth, derivatives=derivatives,
         )
         return to_library(result, like)
+    if checks.true_or_false("derivatives", derivatives):
+        options = {"check_poses": check_poses, "threads": threads, "algorithm": algorithm}
+        result = distance(A, B, X_WA, X_WB, max_distance=max_distance, signed=signed, depth=depth, **options)
+        return PairDerivatives(result, partial(_rows_again, check_threads(threads)))
     limit = checks.limit("max_distance", max_distance)
     signed = checks.true_or_false("signed", signed)
     least = checked_depth(depth) and signed
@@ -296,6 +319,11 @@ def distance(
         why = REFUSED.get((method_of(*map(kind_of, shapes)), "distance"), REFUSED[Method.PLANES, "distance"])
         raise UnsupportedQuery(f"distance of {pair}{where}: {why}")
     return PairResult(rows, single, (_immutable(A), _immutable(B), *pose_copies), certify)
+
+
+def _rows_again(threads: int, A, B, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
+    """Rows of pairs at checked poses that are moved a little."""
+    return distance(A, B, X_WA, X_WB, check_poses=False, threads=threads).rows
 
 
 def _immutable(shapes):

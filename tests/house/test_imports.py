@@ -51,7 +51,10 @@ ROOMS = {
         "errors", "base", "transforms", "results", "numerics", "least_distance", "hull", "shapes", "lowering",
         "narrowphase",
     },
-    "pairs": {"errors", "base", "transforms", "results", "shapes", "lowering", "narrowphase", "certificates"},
+    "derivatives": {"errors", "base", "kernels", "results", "numerics", "curved", "shapes", "lowering", "narrowphase"},
+    "pairs": {
+        "errors", "base", "transforms", "results", "shapes", "lowering", "narrowphase", "certificates", "derivatives",
+    },
     "contact": {
         "errors", "base", "kernels", "transforms", "results", "numerics", "hull", "curved", "support", "mesh", "shapes",
         "lowering", "narrowphase", "pairs",

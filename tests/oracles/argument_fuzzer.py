@@ -413,6 +413,7 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "SpacePartition": partition,
     "ConvexCells": lambda: partition().convex_pieces(),
     "Contacts": lambda: collide.contacts(**PAIR),
+    "PairDerivatives": lambda: collide.distance(**PAIR, derivatives=True),
     "PairResult": lambda: collide.distance(**PAIR),
     "RayHits": lambda: collide.raycast(**GOOD["raycast"]()),
     "WorldResult": lambda: world().distances(),
@@ -545,7 +546,9 @@ EXCUSED = {
     "How": "an enumeration of Python's own",
     "WorldResult": "made by World's queries",
     "WorldHits": "made by World's queries",
+    "PairDerivatives": "made by queries",
     "PairResult": "made by queries",
+    "Uniqueness": "an enumeration of Python's own",
     "Contacts": "made by queries",
     "RayHits": "a tuple, made by queries",
     "ConvexCells": "made by SpacePartition",
@@ -625,7 +628,7 @@ def targets() -> tuple[list[Target], list[str]]:
                 tried.append(Target(name, lambda value=value: value, GOOD[name]))
             elif name not in EXCUSED and not is_tuple:
                 unknown.append(name)
-            tried += _methods(name, value, unknown) if not is_tuple and name != "How" else []
+            tried += _methods(name, value, unknown) if not is_tuple and name not in ("How", "Uniqueness") else []
         elif name in GOOD:
             tried.append(Target(name, lambda value=value: value, GOOD[name]))
         elif name not in EXCUSED:

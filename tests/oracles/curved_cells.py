@@ -74,7 +74,9 @@ class Pose(NamedTuple):
 
 
 def make_pose(X) -> Pose:
-    """A (4, 4) matrix of doubles, entry by entry."""
+    """A (4, 4) matrix of doubles, entry by entry; a `Pose` as it is."""
+    if isinstance(X, Pose):
+        return X
     X = np.asarray(X, dtype=np.float64).tolist()
     return Pose(tuple(vector(row[:3]) for row in X[:3]), vector(row[3] for row in X[:3]))  # type: ignore[arg-type]
 

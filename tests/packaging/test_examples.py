@@ -199,6 +199,7 @@ GIVEN = {
     "partitions": "mesh = collide.Mesh(*collide.tessellate(collide.Box((1, 1, 1)))[:2]); points = np.zeros((2, 3))\n"
     "low, high = (-2, -2, -2), (2, 2, 2)",
     "planar": "from collide.polytopes import planar_pose\nX_WBs = np.array([planar_pose((x, 0)) for x in (1, 5)])",
+    "derivatives": "",
     "polytopes": "",
     "shapes": "",
     "robots": "X_LS = np.eye(4); world = collide.World(); Q = Q0 = np.zeros((2, 1)); Q1 = Q + 0.1; q = Q[0]\n"
