@@ -236,6 +236,7 @@ def _add_report(commands) -> None:
                         help="add poses, shapes and triangles of every body to the JSON, to draw it from")
     _output_arguments(parser)
     cli_pages.add_argument(parser)
+    cli_pages.add_glb_argument(parser)
 
 
 def _add_view(commands) -> None:
@@ -273,10 +274,12 @@ def _add_check(commands) -> None:
                        help="a known collision deeper than it was by more than this counts as new (0.1mm)")
     group.add_argument("--write-baseline", metavar="FILE", help="write the collisions there are as known ones; exit 0")
     group.add_argument("--junit", metavar="FILE", help="write JUnit XML, a test case for every body")
+    group.add_argument("--sarif", metavar="FILE", help="write SARIF 2.1.0, a result for every pair, for code hosts")
     group.add_argument("--csv", metavar="FILE",
                        help="write the lines of output as a table: what,a,b,distance,state,where")
     _output_arguments(parser)
     cli_pages.add_argument(parser)
+    cli_pages.add_glb_argument(parser)
 
 
 def _add_compare(commands) -> None:

@@ -75,6 +75,8 @@ def _run(argv: list[str]) -> int:
         check_place("--json", args.json, ".json")  # before the work, not after it
     if getattr(args, "html", None) is not None:
         cli_pages.check_page_place(args.html)
+    if getattr(args, "glb", None) is not None:
+        check_place("--glb", args.glb, ".glb")
     if getattr(args, "json", None) == getattr(args, "html", None) == "-":
         raise InvalidArgument("--json and --html: standard output takes one of them")
     with _log_on_stderr(getattr(args, "quiet", False)):
@@ -157,6 +159,8 @@ def _report(args) -> int:
     _write_reports(made, args.json)
     if args.html:
         cli_pages.write_report(args, made, progress)
+    if args.glb:
+        cli_pages.write_glb(args.glb, made[0], progress)
     if _has_stdout(args):
         from collide.reports import state_reports as states
 
@@ -167,10 +171,11 @@ def _report(args) -> int:
 
 
 def _check(args) -> int:
-    from collide.reports import checking, junit
+    from collide.reports import checking, junit, sarif
 
     known = checking.read_baseline(args.baseline) if args.baseline else None
-    for option, suffix in (("--write-baseline", ".json"), ("--junit", ".xml"), ("--csv", ".csv")):
+    places = {"--write-baseline": ".json", "--junit": ".xml", "--csv": ".csv", "--sarif": ".sarif"}
+    for option, suffix in places.items():
         place = getattr(args, option[2:].replace("-", "_"))
         if place:
             check_place(option, place, suffix)
@@ -189,10 +194,15 @@ def _check(args) -> int:
         write_whole(args.write_baseline, checking.baseline_text(checks))
     if args.junit:
         write_whole(args.junit, junit.text(checks))
+    if args.sarif:
+        report = made[0].report
+        write_json(sarif.items(checks, report.scene["sources"], report.missing_meshes), args.sarif)
     if args.csv:
         write_whole(args.csv, checking.csv_text(checks))
     if args.html:
         cli_pages.write_check(args, made, checks, progress)
+    if args.glb:
+        cli_pages.write_glb(args.glb, made[0], progress)
     if _has_stdout(args):
         print_lines(line for result in checks for line in result.lines(len(checks) > 1))
     if not args.quiet:
@@ -225,8 +235,8 @@ def _say_what_was_taken(report) -> None:
     """Free may mean less than it seems: what has no inside, and what stands in for something else."""
     surfaces = sorted({entry["body"] for entry in report.meshes if not entry["solid"]})
     others = sorted({entry["body"] for entry in report.approximations})
-    for entry in report.missing_meshes:
-        _say(f"not checked: {entry}")
+    for entry in (*(f"not checked: {mesh}" for mesh in report.missing_meshes), *report.asks):
+        _say(entry)
     for bodies, what in ((surfaces, "surfaces without an inside"), (others, "not the shape the scene names")):
         if bodies:
             more = f" and {len(bodies) - 3} more" if len(bodies) > 3 else ""

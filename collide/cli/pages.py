@@ -20,6 +20,22 @@ def add_argument(parser) -> None:
                              "standard output")
 
 
+def add_glb_argument(parser) -> None:
+    """``--glb``, for a command with a report on a scene."""
+    parser.add_argument("--glb", metavar="FILE",
+                        help="write the scene as binary glTF, bodies in the colours of their verdicts; of several "
+                             "states the first")
+
+
+def write_glb(place: str, stated, progress: Callable) -> None:
+    """The scene of a report (`collide.reports.state_reports.Stated`) as binary glTF."""
+    from collide.base.whole_file import whole_file
+    from collide.pages.scene_glb import scene_glb
+
+    with progress("writing the scene"), whole_file(place) as file:
+        file.writelines(scene_glb(stated.scene, stated.report))
+
+
 def check_page_place(place: str) -> None:
     """Refuse, before any work is done, a place that no page can be written to.
 

@@ -1,7 +1,7 @@
 """Numbers as people read them: lengths with a unit, coordinates, seconds.
 
-JSON carries full precision; these are for the terminal. Every length keeps at least three
-significant digits and its unit, so that a 1 µm part and a 1 km terrain both read well.
+JSON carries full precision; these are for the terminal. Every length keeps at least three significant digits and its
+unit, the same for all of a column, so that a 1 µm part and a 1 km terrain both read well.
 """
 
 from __future__ import annotations
@@ -40,6 +40,11 @@ def brief_length(metres: float) -> str:
     return f"{metres:.3g} m"
 
 
+def parted(distance: float) -> str:
+    """A signed distance in words: ``4 mm deep``, ``20 mm apart``."""
+    return f"{brief_length(abs(distance))} {'deep' if distance < 0.0 else 'apart'}"
+
+
 def volume(cubic_metres: float) -> str:
     """A volume inside a sentence: ``1.5 m³``, ``12.3 cm³``, ``0.4 mm³``."""
     for unit, size in (("m³", 1.0), ("cm³", 1e-6)):
@@ -49,24 +54,33 @@ def volume(cubic_metres: float) -> str:
 
 
 def lengths(values) -> list[str]:
-    """A column of lengths, decimal points aligned, each with its own unit."""
-    split = [_split(float(v)) for v in values]
-    digits = max((len(number) for number, _ in split), default=0)
-    units = max((len(unit) for _, unit in split), default=0)
-    return [f"{number:>{digits}} {unit:<{units}}" for number, unit in split]
+    """A column of lengths, all in the unit of the largest, aligned to the right."""
+    sizes = [float(v) for v in values]
+    finite = [abs(v) for v in sizes if math.isfinite(v)]
+    unit, factor = _unit_of(max(finite)) if finite else ("", None)
+    numbers = [_in_unit(v, factor) if math.isfinite(v) else "unbounded" for v in sizes]
+    width = max(map(len, numbers), default=0)
+    return [f"{number:>{width}} {unit if math.isfinite(v) else '':<{len(unit)}}" for number, v in zip(numbers, sizes)]
 
 
-def _split(metres: float) -> tuple[str, str]:
-    size = abs(metres)
-    if not math.isfinite(size):
-        return "unbounded", ""
-    if size >= 1e6 or 0 < size < 1e-7:
-        return f"{metres:.2e}", "m"
-    if size >= 10:
-        return f"{metres:.3f}", "m"
-    if 0 < size < 1e-4:
-        return f"{metres * 1e6:.3f}", "µm"
-    return f"{metres * 1e3:.3f}", "mm"
+def _unit_of(largest: float) -> tuple[str, float | None]:
+    """(unit, units in a metre) of a column; ``None`` where numbers are powers of ten of a metre."""
+    if largest >= 1e6 or 0.0 < largest < 1e-7:
+        return "m", None
+    if largest >= 10.0:
+        return "m", 1.0
+    return ("mm", 1e3) if largest >= 1e-4 or largest == 0.0 else ("µm", 1e6)
+
+
+def _in_unit(metres: float, factor: float | None) -> str:
+    """Three decimals, more where these would be less than three significant digits."""
+    if factor is None:
+        return f"{metres:.2e}" if metres else "0.000"
+    value = metres * factor
+    size = abs(value)
+    if size == 0.0 or size >= 0.0995:
+        return f"{value:.3f}"
+    return f"{value:.2e}" if size < 1e-4 else f"{value:.{2 - math.floor(math.log10(size))}f}"
 
 
 def widths(values) -> list[str]:

@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import os
 import platform
 import time
 from collections.abc import Iterable, Iterator
@@ -64,6 +65,11 @@ class Report:
     def collides(self) -> bool:
         """True where at least one pair collides, counting neither shallow nor touching pairs."""
         return bool(self.colliding)
+
+    @property
+    def asks(self) -> list[str]:
+        """Notes that ask whether the input is as meant: units of meshes, degrees for radians, a robot without SRDF."""
+        return [note for note in dict.fromkeys(self.notes) if "?" in note]
 
     def verdict(self) -> str:
         """The report in one line."""
@@ -178,8 +184,30 @@ def make(
         versions=versions(),
         bodies=[body.name for body in scene.bodies],
     )
+    report.notes += _robots_without_srdf(scene, report.colliding)
     report.seconds = _seconds(scene, stats, start, tested, started)
     return report
+
+
+def _robots_without_srdf(scene, colliding: Pairs) -> list[str]:
+    """A note for each robot whose own links collide, and of which no file says what links never meet."""
+    unsaid = {
+        name: placement.carried for name, placement in scene.placements.items()
+        if placement.robot.semantic_pairs is None
+    }
+    counts = dict.fromkeys(unsaid, 0)
+    for pair in colliding if unsaid else ():
+        for name, carried in unsaid.items():
+            counts[name] += pair.a in carried and pair.b in carried
+    return [
+        f"robot {name} has no SRDF, and {count(n, 'pair')} of its links collide: can these ever be apart? "
+        f"`collide srdf {_brief_path(scene.robots[name].sources)} --out {name}.srdf` proposes which need no test"
+        for name, n in counts.items() if n
+    ]
+
+
+def _brief_path(sources) -> str:
+    return os.path.relpath(sources[0]) if sources else "ROBOT"
 
 
 def without(scene, pairs: Iterable[tuple[str, str]]):

@@ -52,6 +52,25 @@ def tables(report: Report, everything: bool, proofs: bool) -> list[Table]:
     return [table for table in all_tables if table.rows]
 
 
+def looked_at_first(report: Report) -> list[str]:
+    """Lines before all tables, for they limit the verdict: meshes missing or repaired, and notes with a question about
+    the input.
+    """
+    repaired = [entry["body"] for entry in report.approximations if entry["what"].startswith("repaired")]
+    lines = [
+        *_first_of([f"NOT CHECKED: {entry}" for entry in report.missing_meshes]), *_first_of(report.asks),
+    ]
+    if repaired:
+        named = _and_more(list(dict.fromkeys(repaired))[:_NAMED], len(set(repaired)) > _NAMED)
+        lines.append(f"{count(len(set(repaired)), 'mesh', 'meshes')} repaired, answers hold for the repaired: {named}")
+    return [f"! {line}" for line in lines]
+
+
+def _first_of(lines: list[str]) -> list[str]:
+    more = f"{len(lines) - _NAMED + 1} more of this kind (--all)"
+    return lines if len(lines) <= _NAMED else [*lines[: _NAMED - 1], more]
+
+
 # --- pairs --------------------------------------------------------------------------------------
 
 
@@ -128,12 +147,14 @@ def _is_range(pair: Pair) -> bool:
 
 def depth_texts(pairs: list[Pair]) -> list[str]:
     """How deep pairs are: a length, ``≤ 5 mm`` where no more is known, ``2 mm … 5 mm`` where both ends are proven."""
-    texts = lengths([_measured(pair, "depth") for pair in pairs])
+    least = [-pair.upper for pair in pairs if _is_range(pair) and pair.upper is not None]
+    texts = lengths([*(_measured(pair, "depth") for pair in pairs), *least])
+    texts, least_texts = texts[: len(pairs)], iter(texts[len(pairs) :])
     for k, pair in enumerate(pairs):
         if _is_bound(pair):
             texts[k] = f"≤ {texts[k]}"
-        elif _is_range(pair) and pair.upper is not None:
-            texts[k] = f"{brief_length(-pair.upper)} … {texts[k].strip()}"
+        elif _is_range(pair):
+            texts[k] = f"{next(least_texts).split()[0]} … {texts[k].lstrip()}"
     return texts
 
 
@@ -240,8 +261,9 @@ def _skip_line(report: Report) -> str:
 
 
 def _note_lines(report: Report) -> list[tuple[str, str]]:
-    """A line for each note, notes of missing meshes first: any of them may matter most."""
-    notes = list(dict.fromkeys([*report.missing_meshes, *report.notes]))
+    """A line for each note; those of `looked_at_first` stand above."""
+    ahead = {*report.missing_meshes, *report.asks}
+    notes = [note for note in dict.fromkeys(report.notes) if note not in ahead]
     lines = notes if len(notes) <= _NOTES else [*notes[: _NOTES - 1], f"… and {len(notes) - _NOTES + 1} more (--all)"]
     return [("notes" if k == 0 else "", line) for k, line in enumerate(lines)]
 

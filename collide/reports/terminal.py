@@ -13,7 +13,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from collide.reports.number_format import count, seconds
-from collide.reports.report_tables import tables
+from collide.reports.report_tables import looked_at_first, tables
 from collide.reports.tables import Line, Table, lay_out, missing_columns, table_lines, wrapped, write_text
 
 if TYPE_CHECKING:
@@ -34,6 +34,8 @@ def render(
     style = "colliding" if report.colliding else "touching" if report.touching or report.shallow else "free"
     lines: list[Line] = [[(line, style)] for line in wrapped(report.verdict(), width, hanging=2)]
     lines += [[(line, "note")] for line in wrapped(_scene_line(report), width, hanging=2)]
+    for text in looked_at_first(report):
+        lines += [[(line, "touching")] for line in wrapped(text, width, hanging=2)]
     dropped: dict[str, None] = {}  # a set that keeps its order
     for table in tables(report, everything, proofs):
         layout = lay_out(table, width, whole_names)

@@ -181,11 +181,16 @@ def _glb(vertices: np.ndarray, faces: np.ndarray, body: _Body) -> Iterator[bytes
         ],
         "accessors": accessors,
     }
+    yield from glb_file(header, chunks)
+
+
+def glb_file(header: dict, chunks: list[bytes]) -> Iterator[bytes]:
+    """The bytes of a GLB file: its JSON, then its buffer, of chunks whose lengths are multiples of 4."""
     text = json.dumps(header).encode()
     text += b" " * (-len(text) % 4)
-    length = 12 + 8 + len(text) + 8 + starts[-1]
-    yield b"glTF" + np.array([2, length, len(text)], dtype="<u4").tobytes() + b"JSON" + text
-    yield np.array([starts[-1]], dtype="<u4").tobytes() + b"BIN\0"
+    size = sum(map(len, chunks))
+    yield b"glTF" + np.array([2, 12 + 8 + len(text) + 8 + size, len(text)], dtype="<u4").tobytes() + b"JSON" + text
+    yield np.array([size], dtype="<u4").tobytes() + b"BIN\0"
     yield from chunks
 
 

@@ -247,7 +247,8 @@ def load_meshes(path: Path, options: Options) -> Scene:
 
 def _together(parts: list[Scene]) -> Scene:
     """Several scenes as one; a mesh whose name is taken is numbered, anything else must be renamed."""
-    whole = Scene(" + ".join(part.name for part in parts))
+    more = f" and {len(parts) - 3} more" if len(parts) > 4 else ""
+    whole = Scene(" + ".join(part.name for part in (parts[:3] if more else parts)) + more)
     names: dict[str, int] = {}
     for part in parts:
         for body in part.bodies:

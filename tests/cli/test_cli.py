@@ -48,7 +48,8 @@ def fake_scene(*rows):
         for n in names.values()
     ]
     return SimpleNamespace(
-        name="fake", bodies=bodies, notes=[], sources=[], robots={}, seconds={"read": 0.0}, world=lambda: world
+        name="fake", bodies=bodies, notes=[], sources=[], robots={}, placements={}, seconds={"read": 0.0},
+        world=lambda: world,
     )
 
 

@@ -399,3 +399,57 @@ def test_free_is_not_said_of_meshes_that_were_skipped(tmp_path, capsys):
     assert run("check", robot, "--missing-meshes", "skip")[0] == 1, "a collision is one, whatever was skipped"
     assert run("check", robot, "--missing-meshes", "skip", "--state", "0,5")[0] == 2
     assert "--allow-missing-meshes" in run("check", "--help")[1]
+
+
+# --- other files --------------------------------------------------------------------------------
+
+
+def test_sarif_and_glb_of_the_command(command, tmp_path):
+    log, file = tmp_path / "c.sarif", tmp_path / "c.glb"
+    assert command(stacked(0.1, -0.02), "check", "--clearance", "50mm", "--sarif", log, "--glb", file)[0] == 1
+    results = json.loads(log.read_text())["runs"][0]["results"]
+    assert [(r["ruleId"], r["level"]) for r in results] == [("collision", "error"), ("near", "error")]
+    assert file.read_bytes()[:4] == b"glTF"
+    assert command(stacked(0.1), "report", "--glb", file, "--quiet")[0] == 0
+    for option, place in (("--sarif", "c.json"), ("--glb", "c.gltf")):
+        status, _, err = command(stacked(0.1), "check", option, tmp_path / place)
+        assert status == 2 and f"{option}: " in err and "must end in" in err
+
+
+@pytest.mark.parametrize(("clearance", "status"), [("10mm", 0), ("50mm", 1), ("5cm", 1), ("0.01", 0)])
+def test_a_clearance_is_a_gate(command, clearance, status):
+    assert command(stacked(-0.02), "check", "--clearance", clearance)[0] == status
+
+
+# --- what is said first -------------------------------------------------------------------------
+
+
+def test_a_robot_without_srdf_whose_links_collide_is_told_of_the_command(tmp_path):
+    links = "".join(
+        f'<link name="l{k}"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>' for k in range(3)
+    )
+    joints = "".join(
+        f'<joint name="j{k}" type="revolute"><parent link="l{k}"/><child link="l{k + 1}"/><axis xyz="0 0 1"/>'
+        '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
+        for k in range(2)
+    )
+    (tmp_path / "r.urdf").write_text(f'<robot name="r">{links}{joints}</robot>')
+    made = report.make(collide.scenes.load(tmp_path / "r.urdf"))
+    (note,) = made.asks
+    assert note.startswith("robot r has no SRDF, and 1 pair of its links collide") and "`collide srdf " in note
+    text = "\n".join("".join(part for part, _ in line) for line in terminal.render(made, width=400))
+    assert text.splitlines()[2] == f"! {note}"
+    (tmp_path / "r.srdf").write_text('<robot name="r"></robot>')
+    with_srdf = report.make(collide.scenes.load(tmp_path / "r.urdf"))
+    assert with_srdf.collides and not with_srdf.asks
+
+
+def test_units_are_asked_about_before_all_tables(tmp_path, capsys):
+    (tmp_path / "t.obj").write_text("v 0 0 0\nv 200 0 0\nv 0 200 0\nv 0 0 200\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+    assert cli.main(["report", str(tmp_path / "t.obj")]) == 0
+    page = " ".join(capsys.readouterr().out.split())
+    assert page.startswith("no collision, no pair to test t: 1 body (0 fixed) ! ") and "is it in millimetres?" in page
+    assert cli.main(["check", str(tmp_path / "t.obj")]) == 0
+    assert "is it in millimetres?" in capsys.readouterr().err
+    assert cli.main(["report", str(tmp_path / "t.obj"), "--scale", "mm"]) == 0
+    assert "millimetres" not in capsys.readouterr().out

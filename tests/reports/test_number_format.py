@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 from collide import InvalidArgument
@@ -45,8 +46,22 @@ def test_lengths_of_a_column_change_their_unit_at_round_numbers(metres, words, s
 
 
 def test_lengths_of_a_column_have_their_points_below_each_other():
-    assert lengths([0.5, 12.0, 2e-6, math.inf]) == ["  500.000 mm", "   12.000 m ", "    2.000 µm", "unbounded   "]
+    assert lengths([0.5, 12.0, 2e-3, math.inf]) == ["    0.500 m", "   12.000 m", "  0.00200 m", "unbounded  "]
     assert lengths([]) == []
+
+
+def test_a_column_of_lengths_has_one_unit_and_three_digits_of_every_length():
+    assert lengths([0.5, 20e-6, -1.04]) == ["  500.000 mm", "   0.0200 mm", "-1040.000 mm"]
+    assert lengths([1e-3, 9e-16]) == ["   1.000 mm", "9.00e-13 mm"]
+    rng = np.random.default_rng(4)
+    for _ in range(200):
+        values = 10.0 ** rng.uniform(-16, 7, 5) * rng.choice([-1, 1], 5)
+        texts = lengths(values)
+        units = {text.split()[1] for text in texts}
+        assert len(units) == 1 and len({len(text) for text in texts}) == 1, texts
+        metres = {"m": 1.0, "mm": 1e-3, "µm": 1e-6}[units.pop()]
+        read = [float(text.split()[0]) * metres for text in texts]
+        assert np.allclose(read, values, rtol=6e-3, atol=0.0), (values, texts)
 
 
 @pytest.mark.parametrize(("cubic_metres", "words"), [

@@ -122,6 +122,7 @@ def test_a_title_has_the_style_of_its_table_and_nothing_else_has():
 ])
 def test_the_style_of_the_verdict_is_that_of_the_worst(monkeypatch, colliding, shallow, touching, style):
     made = SimpleNamespace(colliding=[0] * colliding, shallow=[0] * shallow, touching=[0] * touching, notes=[],
+                           missing_meshes=[], asks=[], approximations=[],
                            verdict=lambda: "verdict", scene={"name": "s", "bodies": 1, "static": 0, "robots": []})
     monkeypatch.setattr(terminal, "tables", lambda *arguments: [])
     assert terminal.render(made)[0] == [("verdict", style)]

@@ -23,6 +23,7 @@ from collide.reports.report_tables import (
     _touching_line,
     _verdict,
     depth_texts,
+    looked_at_first,
 )
 
 
@@ -46,7 +47,7 @@ class Some(list):
 
 
 @pytest.mark.parametrize(("one", "text", "z"), [
-    (BOUND, "≤ 5.000 mm", 4.0), (RANGE, "2 mm … 5.000 mm", 4.0), (NARROW, "5.000 mm", 3.0), (pair(), "2.000 mm", 3.0),
+    (BOUND, "≤ 5.000 mm", 4.0), (RANGE, "2.000 … 5.000 mm", 4.0), (NARROW, "5.000 mm", 3.0), (pair(), "2.000 mm", 3.0),
 ])
 def test_depths_that_are_bounds_or_ranges(one, text, z):
     """Those are told to be in the middle of the contact."""
@@ -119,7 +120,7 @@ def test_numbers_of_pairs():
 @pytest.mark.parametrize("n", [0, 1, 7, 8, 9, 12])
 def test_notes_are_listed_up_to_eight_lines(n):
     notes = [f"note {k}" for k in range(n)]
-    lines = _note_lines(SimpleNamespace(missing_meshes=[], notes=notes))
+    lines = _note_lines(SimpleNamespace(missing_meshes=[], asks=[], notes=notes))
     assert len(lines) == min(n, 8) and [label for label, _ in lines] == ["notes", *[""] * 7][: len(lines)]
     if n > 8:
         assert lines[-1][1] == f"… and {n - 7} more (--all)" and [text for _, text in lines[:-1]] == notes[:7]
@@ -127,9 +128,19 @@ def test_notes_are_listed_up_to_eight_lines(n):
         assert [text for _, text in lines] == notes
 
 
-def test_notes_of_missing_meshes_come_first_and_once():
-    lines = _note_lines(SimpleNamespace(missing_meshes=["lost"], notes=["other", "lost"]))
-    assert lines == [("notes", "lost"), ("", "other")]
+def test_what_is_looked_at_first_stands_above_and_not_among_the_notes():
+    asks = [f"mesh {k} is 120 m across: is it in millimetres?" for k in range(4)]
+    repaired = [{"body": f"m{k}", "what": "repaired: turned 2 facets over"} for k in (0, 0, 1, 2, 3)]
+    hull = [{"body": "h", "what": "its convex hull"}]
+    made = SimpleNamespace(missing_meshes=["lost"], asks=asks, notes=[*asks, "other", "lost"],
+                           approximations=[*repaired, *hull])
+    assert _note_lines(made) == [("notes", "other")]
+    lines = looked_at_first(made)
+    assert lines[:3] == ["! NOT CHECKED: lost", f"! {asks[0]}", f"! {asks[1]}"]
+    assert lines[3] == "! 2 more of this kind (--all)"
+    assert lines[4:] == ["! 4 meshes repaired, answers hold for the repaired: m0, m1, m2, …"]
+    nothing = SimpleNamespace(missing_meshes=[], asks=[], notes=["other"], approximations=hull)
+    assert looked_at_first(nothing) == []
 
 
 @pytest.mark.parametrize("n", [1, 3, 4])
