@@ -100,8 +100,8 @@ static collide_status write_contact(const struct cast_question *asked, collide_f
     collide_pair pair;
     begin_contact(first);
     if (row[CAST_STATUS] != CAST_HIT) return COLLIDE_OK;
-    if (value < row[CAST_LOWER]) value = row[CAST_LOWER];
-    if (value > row[CAST_UPPER]) value = row[CAST_UPPER];
+    if (!(value > row[CAST_LOWER])) value = row[CAST_LOWER]; /* of zeros the bracket's, whose sign is plus */
+    if (!(value < row[CAST_UPPER])) value = row[CAST_UPPER];
     first->distance = unscaled(cast, value);
     first->lower = unscaled(cast, row[CAST_LOWER]);
     first->upper = unscaled(cast, row[CAST_UPPER]);

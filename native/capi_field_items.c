@@ -2,26 +2,21 @@
    lists them and `_union_row` of field_pairs.py asks. */
 #include "capi_field.h"
 
+#include <stdlib.h>
+
 /* What rounding of a box's sides is, as a part of the numbers met (2^-40); heights over a plane that are looked at again
    (2^-36). */
 static const double ROUNDING = 9.094947017729282e-13, LEVEL = 1.4551915228366852e-11;
 /* Matrices no farther off rotations are rounded rotations; farther off (2^-10) they are inverted. */
 static const double ROTATION = 1e-13, FAR_OFF = 0.0009765625;
 
-/* Numbers of balls or boxes of cells that may be met. */
-struct listing {
-    int64_t *numbers, n;
-};
-
-/* Row-major products with a pose's rotation, turned back: R^T v. */
-static void turn_back(const double *X, const double v[3], double out[3])
+void turn_back(const double *X, const double v[3], double out[3])
 {
     int k;
     for (k = 0; k < 3; k++) out[k] = X[k] * v[0] + X[4 + k] * v[1] + X[8 + k] * v[2];
 }
 
-/* The largest entry of R^T R - I. */
-static double off_rotation(const double *X)
+double off_rotation(const double *X)
 {
     double off = 0.0, column[3], turned[3];
     int i, j;
@@ -34,7 +29,7 @@ static double off_rotation(const double *X)
     return off;
 }
 
-static double shift_of(const double *X) { return fabs(X[3]) + fabs(X[7]) + fabs(X[11]); }
+double shift_of(const double *X) { return fabs(X[3]) + fabs(X[7]) + fabs(X[11]); }
 
 /* A box in a field's frame; lengths there are at most `stretch` times as long as in the world. */
 struct seen_box {
@@ -50,8 +45,7 @@ static double length_of(const double *rows, int step)
     return sqrt(square);
 }
 
-/* The inverse of a matrix, row by row: the transpose where the matrix is near a rotation. */
-static void invert(const double *X, double off, double inverse[9])
+void invert_rotation(const double *X, double off, double inverse[9])
 {
     double determinant;
     int i, j;
@@ -74,7 +68,7 @@ static struct seen_box box_around(const struct field_pair *pair)
     struct seen_box seen;
     int64_t first = 0;
     int i, j, k;
-    invert(F, off, inverse);
+    invert_rotation(F, off, inverse);
     seen.stretch = off < ROTATION ? 1.0 : 1.0 + 2.0 * off;
     if (off > FAR_OFF) {
         seen.stretch = length_of(inverse, 3);
@@ -135,10 +129,9 @@ static struct listing cells_within(const struct field_pair *pair, struct arena *
 {
     const collide_field *field = pair->field;
     struct listing some = {NULL, 0};
-    int64_t *stack, range[6], m[MEASURES], tree_at = address_of(field->tree);
+    int64_t *stack, range[6], tree_at = address_of(field->tree);
     double reach = distance * box->stretch * (1.0 + ROUNDING);
     int k;
-    workspace_sizes(pair->space->kernels, m);
     for (k = 0; k < 3; k++) {
         double origin = field->numbers[ORIGIN + k], side = field->numbers[SIDES + k], most = (double)field->tree[CELLS_ALONG + k];
         double first = (box->low[k] - reach - origin) / side, last = (box->high[k] + reach - origin) / side;
@@ -147,7 +140,7 @@ static struct listing cells_within(const struct field_pair *pair, struct arena *
         range[k] = first < 1.0 ? 0 : (int64_t)floor(first) - 1;
         range[3 + k] = last + 1.0 > most - 1.0 ? field->tree[CELLS_ALONG + k] - 1 : (int64_t)floor(last) + 1;
     }
-    if ((stack = arena_take(arena, (size_t)m[M_CELL_STACK] * sizeof *stack)) == NULL) return some;
+    if ((stack = cell_stack(pair->space, arena)) == NULL) return some;
     some.n = pair->space->kernels->cells_in_range(tree_at, address_of(range), address_of(range + 3), 0, 0, address_of(stack));
     if ((some.numbers = arena_take(arena, (size_t)some.n * sizeof *some.numbers)) == NULL) some.n = 0;
     pair->space->kernels->cells_in_range(tree_at, address_of(range), address_of(range + 3), address_of(some.numbers), some.n,
@@ -160,16 +153,13 @@ static struct listing cells_within(const struct field_pair *pair, struct arena *
 static double normal_of(const struct field_pair *pair, double n[3])
 {
     const double *own = pair->shape->numbers + PARAMS, *S = pair->X_WS;
-    double world[3], length, size = shift_of(pair->X_WF) + shift_of(S);
+    double world[3], length;
     int k;
     for (k = 0; k < 3; k++) world[k] = S[4 * k] * own[0] + S[4 * k + 1] * own[1] + S[4 * k + 2] * own[2];
     length = sqrt(world[0] * world[0] + world[1] * world[1] + world[2] * world[2]);
-    for (k = 0; k < 3; k++) {
-        world[k] /= length;
-        size += fabs(pair->field->low[k]) > fabs(pair->field->high[k]) ? fabs(pair->field->low[k]) : fabs(pair->field->high[k]);
-    }
+    for (k = 0; k < 3; k++) world[k] /= length;
     turn_back(pair->X_WF, world, n);
-    return LEVEL * size;
+    return LEVEL * (reach_of_items(pair->field) + shift_of(pair->X_WF) + shift_of(S));
 }
 
 /* Of listed items with heights those no higher than the lowest and a slack. */
@@ -182,12 +172,12 @@ static void keep_lowest(struct listing *some, const double *heights, double slac
         if (heights[k] <= lowest + slack) some->numbers[some->n++] = some->numbers[k];
 }
 
-static struct listing lowest_balls(const struct field_pair *pair, struct arena *arena)
+static struct listing lowest_balls(const struct field_pair *pair, struct arena *arena, const double n[3], double slack)
 {
     const collide_field *field = pair->field;
     const double *points = (const double *)(intptr_t)field->tree[TRIANGLES_AT];
     struct listing some = {NULL, 0};
-    double n[3], slack = normal_of(pair, n), *heights = arena_take(arena, (size_t)field->tree[N_FACETS] * sizeof *heights);
+    double *heights = arena_take(arena, (size_t)field->tree[N_FACETS] * sizeof *heights);
     int64_t k;
     if ((some.numbers = arena_take(arena, (size_t)field->tree[N_FACETS] * sizeof *some.numbers)) == NULL) return some;
     for (k = 0; k < field->tree[N_FACETS]; k++) {
@@ -200,14 +190,13 @@ static struct listing lowest_balls(const struct field_pair *pair, struct arena *
     return some;
 }
 
-static struct listing lowest_cells(const struct field_pair *pair, struct arena *arena)
+static struct listing lowest_cells(const struct field_pair *pair, struct arena *arena, const double n[3], double slack)
 {
     const struct collide_kernels *kernels = pair->space->kernels;
     struct listing some = {NULL, 0};
-    double n[3], slack = normal_of(pair, n), *heights;
-    int64_t m[MEASURES], *stack, tree_at = address_of(pair->field->tree);
-    workspace_sizes(kernels, m);
-    if ((stack = arena_take(arena, (size_t)m[M_CELL_STACK] * sizeof *stack)) == NULL) return some;
+    double *heights;
+    int64_t *stack, tree_at = address_of(pair->field->tree);
+    if ((stack = cell_stack(pair->space, arena)) == NULL) return some;
     some.n = kernels->lowest_cells(tree_at, address_of(n), slack, 0, 0, 0, address_of(stack));
     heights = arena_take(arena, (size_t)some.n * sizeof *heights);
     if ((some.numbers = arena_take(arena, (size_t)some.n * sizeof *some.numbers)) == NULL) {
@@ -219,64 +208,111 @@ static struct listing lowest_cells(const struct field_pair *pair, struct arena *
     return some;
 }
 
+/* The items that are higher along a normal than the lowest by no more than a slack. */
+static struct listing lowest_items(const struct field_pair *pair, struct arena *arena, const double n[3], double slack)
+{
+    return pair->field->are == BALLS ? lowest_balls(pair, arena, n, slack) : lowest_cells(pair, arena, n, slack);
+}
+
+/* The items near what is in a box. */
+static struct listing items_around(const struct field_pair *pair, struct arena *arena, double distance)
+{
+    struct seen_box box = box_around(pair);
+    return pair->field->are == BALLS ? balls_within(pair, arena, &box, distance) : cells_within(pair, arena, &box, distance);
+}
+
 /* The items that may come within a distance of the shape; of a half-space the lowest ones over it. */
 static struct listing items_within(const struct field_pair *pair, struct arena *arena, double distance)
 {
-    int balls = pair->field->are == BALLS;
-    struct seen_box box;
-    if (pair->shape->ints[KIND] == HALFSPACE) return balls ? lowest_balls(pair, arena) : lowest_cells(pair, arena);
-    box = box_around(pair);
-    return balls ? balls_within(pair, arena, &box, distance) : cells_within(pair, arena, &box, distance);
+    double n[3], slack;
+    if (pair->shape->ints[KIND] != HALFSPACE) return items_around(pair, arena, distance);
+    slack = normal_of(pair, n);
+    return lowest_items(pair, arena, n, slack);
+}
+
+/* How low an item is along a normal. */
+static double least_height(const collide_field *field, int64_t item, const double n[3])
+{
+    const double *p = (const double *)(intptr_t)field->tree[TRIANGLES_AT] + 3 * item;
+    double height = 0.0;
+    int k;
+    if (field->are == BALLS)
+        return p[0] * n[0] + p[1] * n[1] + p[2] * n[2] - (field->radii == NULL ? field->radius : field->radii[item]);
+    for (k = 0; k < 3; k++) {
+        double low = (double)axis_of(item, k) * field->numbers[SIDES + k] + field->numbers[ORIGIN + k];
+        double high = (double)(axis_of(item, k) + 1) * field->numbers[SIDES + k] + field->numbers[ORIGIN + k];
+        height += n[k] * low < n[k] * high ? n[k] * low : n[k] * high;
+    }
+    return height;
+}
+
+/* The items that reach below a half-space's plane, moved outwards by a distance and what rounds: of the numbers met, 2^-40, and what
+   the matrices are off rotations. */
+static struct listing items_below(const struct field_pair *pair, struct arena *arena, double distance)
+{
+    static const struct listing none = {NULL, 0};
+    const double *F = pair->X_WF, *S = pair->X_WS, *own = pair->shape->numbers + PARAMS;
+    double away[3] = {S[3] - F[3], S[7] - F[7], S[11] - F[11]}, there[3], n[3], height, size, least;
+    struct listing lowest;
+    (void)normal_of(pair, n);
+    turn_back(F, away, there);
+    height = own[3] / sqrt(own[0] * own[0] + own[1] * own[1] + own[2] * own[2]) + n[0] * there[0] + n[1] * there[1] + n[2] * there[2];
+    size = reach_of_items(pair->field) + fabs(height) + shift_of(F) + shift_of(S) + distance;
+    height += distance * (1.0 + ROUNDING) + (ROUNDING + 8.0 * (off_rotation(F) + off_rotation(S))) * size;
+    lowest = lowest_items(pair, arena, n, 0.0);
+    if (arena->failed || lowest.n == 0) return none;
+    least = least_height(pair->field, lowest.numbers[0], n);
+    return least <= height ? lowest_items(pair, arena, n, height - least) : none;
+}
+
+static int by_number(const void *one, const void *other)
+{
+    int64_t a = *(const int64_t *)one, b = *(const int64_t *)other;
+    return (a > b) - (a < b);
+}
+
+struct listing items_near(const struct field_pair *pair, struct arena *arena, double distance)
+{
+    int is_halfspace = pair->shape->ints[KIND] == HALFSPACE;
+    struct listing some = is_halfspace ? items_below(pair, arena, distance) : items_around(pair, arena, distance);
+    if (!arena->failed && some.n > 0) qsort(some.numbers, (size_t)some.n, sizeof *some.numbers, by_number);
+    return some;
 }
 
 /* --- items as shapes -------------------------------------------------------------------------------------------------- */
 
-/* The row of a convex item in the field's frame and the pair's shape. */
-static collide_status row_of_hull(const struct field_pair *pair, const double *points, size_t n, double radius, unsigned flags,
-                                  collide_pair *row)
+/* The row of an item, whose shape was made, or why there is none, and the pair's shape. */
+static collide_status row_of_shape(const struct field_pair *pair, collide_status status, collide_shape *item, unsigned flags,
+                                   collide_pair *row)
 {
-    collide_shape *item;
-    collide_status status = collide_hull(points, n, radius, &item);
     if (status == COLLIDE_OK)
         status = collide_distance(pair->space, item, pair->shape, pair->X_WF, pair->X_WS, INFINITE, flags, row);
     collide_shape_free(item);
-    return status == COLLIDE_INVALID_SHAPE ? COLLIDE_OUT_OF_RANGE : status; /* coordinates below 1e-50 m */
+    return status;
 }
 
-static collide_status row_of_ball(const struct field_pair *pair, int64_t number, unsigned flags, collide_pair *row)
+static collide_status row_of_one(const struct field_pair *pair, int64_t item, unsigned flags, collide_pair *row)
 {
-    const double *points = (const double *)(intptr_t)pair->field->tree[TRIANGLES_AT];
-    double radius = pair->field->radii == NULL ? pair->field->radius : pair->field->radii[number];
-    return row_of_hull(pair, points + 3 * number, 1, radius, flags, row);
+    collide_shape *shape;
+    collide_status status = shape_of_item(pair->field, item, &shape);
+    return row_of_shape(pair, status, shape, flags, row);
 }
 
 /* A box of cells, six numbers of `merge_cells` counted from a cell. */
 static collide_status row_of_box(const struct field_pair *pair, const int64_t *box, const int64_t first[3], unsigned flags,
                                  collide_pair *row)
 {
-    const double *origin = pair->field->numbers + ORIGIN, *sides = pair->field->numbers + SIDES;
-    double corners[24];
-    int k;
-    for (k = 0; k < 24; k++) {
-        int axis = k % 3;
-        int64_t least = first[axis] + box[axis];
-        if (k / 3 >> (2 - axis) & 1) least += box[3 + axis];
-        corners[k] = (double)least * sides[axis] + origin[axis];
-    }
-    return row_of_hull(pair, corners, 8, 0.0, flags, row);
+    const int64_t least[3] = {first[0] + box[0], first[1] + box[1], first[2] + box[2]};
+    collide_shape *shape;
+    collide_status status = shape_of_cells(pair->field, least, box + 3, &shape);
+    return row_of_shape(pair, status, shape, flags, row);
 }
 
-static int64_t axis_of(int64_t word, int axis) { return word >> (16 * (2 - axis)) & 0xFFFF; }
-
-/* Fewer boxes with the union of some cells, and whether the shape meets any. */
-static collide_status boxes_meet(const struct field_pair *pair, struct arena *arena, const struct listing *some, uint8_t *hit)
+int64_t merge_listed(const struct field_pair *pair, struct arena *arena, const struct listing *some, int64_t first[3], int64_t **boxes)
 {
-    collide_status status = COLLIDE_OK;
-    int64_t first[3], along[3], *boxes, n_boxes, k;
-    collide_pair row;
+    int64_t along[3], k;
     uint8_t *block;
     int axis;
-    if (some->n == 0) return COLLIDE_OK;
     for (axis = 0; axis < 3; axis++) {
         int64_t last = first[axis] = axis_of(some->numbers[0], axis);
         for (k = 1; k < some->n; k++) {
@@ -287,13 +323,24 @@ static collide_status boxes_meet(const struct field_pair *pair, struct arena *ar
         along[axis] = last + 1 - first[axis];
     }
     block = arena_take(arena, (size_t)(along[0] * along[1] * along[2]));
-    if ((boxes = arena_take(arena, 6 * (size_t)some->n * sizeof *boxes)) == NULL) return COLLIDE_NO_MEMORY;
+    if ((*boxes = arena_take(arena, 6 * (size_t)some->n * sizeof **boxes)) == NULL) return 0;
     memset(block, 0, (size_t)(along[0] * along[1] * along[2]));
     for (k = 0; k < some->n; k++) {
         int64_t word = some->numbers[k], row = (axis_of(word, 0) - first[0]) * along[1] + axis_of(word, 1) - first[1];
         block[row * along[2] + axis_of(word, 2) - first[2]] = 1;
     }
-    n_boxes = pair->space->kernels->merge_cells(address_of(block), along[0], along[1], along[2], address_of(boxes));
+    return pair->space->kernels->merge_cells(address_of(block), along[0], along[1], along[2], address_of(*boxes));
+}
+
+/* Whether the shape meets any of some cells, by boxes of them. */
+static collide_status boxes_meet(const struct field_pair *pair, struct arena *arena, const struct listing *some, uint8_t *hit)
+{
+    collide_status status = COLLIDE_OK;
+    int64_t first[3], *boxes, n_boxes, k;
+    collide_pair row;
+    if (some->n == 0) return COLLIDE_OK;
+    n_boxes = merge_listed(pair, arena, some, first, &boxes);
+    if (arena->failed) return COLLIDE_NO_MEMORY;
     for (k = 0; k < n_boxes && status == COLLIDE_OK && !*hit; k++) {
         status = row_of_box(pair, boxes + 6 * k, first, pair->flags | COLLIDE_UNSIGNED, &row);
         *hit = row.hit;
@@ -307,7 +354,7 @@ static collide_status balls_meet(const struct field_pair *pair, const struct lis
     collide_pair row;
     int64_t k;
     for (k = 0; k < some->n && status == COLLIDE_OK && !*hit; k++) {
-        status = row_of_ball(pair, some->numbers[k], pair->flags | COLLIDE_UNSIGNED, &row);
+        status = row_of_one(pair, some->numbers[k], pair->flags | COLLIDE_UNSIGNED, &row);
         *hit = row.hit;
     }
     return status;
@@ -332,14 +379,9 @@ collide_status items_meet(const struct field_pair *pair, uint8_t *hit)
 /* The row of a ball by its number, or of a cell by its word, and how results name it. */
 static collide_status row_named(const struct field_pair *pair, int64_t item, unsigned flags, collide_pair *row)
 {
-    static const int64_t first[3] = {0, 0, 0};
-    const int64_t *along = pair->field->tree + CELLS_ALONG;
-    int64_t box[6] = {axis_of(item, 0), axis_of(item, 1), axis_of(item, 2), 1, 1, 1};
-    collide_status status;
+    collide_status status = row_of_one(pair, item, flags, row);
     int k;
-    if (pair->field->are == BALLS) status = row_of_ball(pair, item, flags, row);
-    else status = row_of_box(pair, box, first, flags, row);
-    row->part_a = (int32_t)(pair->field->are == BALLS ? item : (box[0] * along[1] + box[1]) * along[2] + box[2]);
+    row->part_a = (int32_t)number_of_item(pair->field, item);
     row->count = 0;
     for (k = 0; k < 4; k++) row->vertices_a[k] = -1;
     return status;

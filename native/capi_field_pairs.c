@@ -236,6 +236,14 @@ static collide_status begin(struct field_question *asked, collide_workspace *spa
     return COLLIDE_OK;
 }
 
+int are_poses(const struct field_pair *pair)
+{
+    int64_t pose_at = address_of(pair->space->field->poses);
+    uint8_t check = !(pair->flags & COLLIDE_TRUST_POSES);
+    return pair->space->kernels->first_bad_pose(address_of(pair->X_WF), 0, 0, 1, check, pose_at) == 1 &&
+           pair->space->kernels->first_bad_pose(address_of(pair->X_WS), 0, 0, 1, check, pose_at) == 1;
+}
+
 /* Number of the first pair at which a matrix is no pose; n where all are. */
 static size_t first_bad(const struct field_question *asked)
 {

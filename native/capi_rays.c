@@ -1,42 +1,14 @@
 /* Where rays first meet a convex shape, a union or a mesh: `raycast` of collide/casts/raycast.py, by the kernels of ray_parts.py, ray_facets.py
    and ray_hits.py. What Python decides in integers is reported by its proven bracket, or said to be unsupported. */
-#include "capi_casts.h"
 #include "capi_compound.h"
-#include "capi_box_tree.h"
+#include "capi_field.h"
 #include "capi_mesh.h"
+#include "capi_rays.h"
 
 typedef char ray_hits_are_rows[sizeof(collide_ray_hit) == 88 ? 1 : -1];
 
-/* Places of a surface that a ray meets, as collide/casts/ray_ends.py has them: a chord has two. */
-struct places {
-    double *t, *normals;      /* three each */
-    int64_t *columns, *first; /* three each: ray, facet, item; the number of the first */
-    uint8_t *flags;           /* two each: proven, certified */
-    int64_t n;
-};
-
-/* Chords of all parts of a union, or of a single shape: where parts stand and what is asked about them. */
-struct chords {
-    int64_t n, ints_at, numbers_at;
-    double *poses, *rows, *limits;       /* of every part, and the union's own pose behind them */
-    int64_t *shape_of, *asked, *listed;
-    uint8_t *exact;
-    struct places places;
-};
-
-/* A ray and what it is cast at: a mesh, or where that is NULL convex parts: of a union, or where that is NULL a shape. */
-struct ray {
-    collide_workspace *space;
-    const collide_mesh *mesh;
-    const collide_compound *compound;
-    struct chords *chords;
-    const double *X, *origin, *direction;
-    double limit; /* in units of the scaled direction, once it is */
-    unsigned flags;
-};
-
-/* Hits of a single ray that there is room for to begin with. */
-enum { HITS_AT_FIRST = 64 };
+/* Hits of a single ray that there is room for to begin with; the mark of one that doubles decide (collide/casts/ray_ends.py). */
+enum { HITS_AT_FIRST = 64, NARROW = 2 };
 
 static void begin_hit(collide_ray_hit *hit)
 {
@@ -46,8 +18,7 @@ static void begin_hit(collide_ray_hit *hit)
     hit->certified = 1;
 }
 
-/* Room for the chords of n parts. */
-static int begin_chords(struct chords *chords, struct arena *arena, int64_t n)
+int begin_chords(struct chords *chords, struct arena *arena, int64_t n)
 {
     size_t k, m = (size_t)n;
     chords->n = n;
@@ -72,26 +43,39 @@ static int begin_chords(struct chords *chords, struct arena *arena, int64_t n)
     return 1;
 }
 
-/* The ends of the ray's chords in all parts, those of them that count. */
-static collide_status ends_of_chords(const struct ray *ray)
+int64_t cut_chords(const struct ray *ray, int both)
 {
     struct chords *chords = ray->chords;
-    struct places *places = &chords->places;
     const struct collide_kernels *kernels = ray->space->kernels;
     struct cast_space *cast = ray->space->cast;
-    int64_t asked_at = address_of(chords->asked), rows_at = address_of(chords->rows), limits_at = address_of(chords->limits), k;
-    if (ray->compound != NULL) kernels->place_all_parts(address_of(ray->compound->parts), chords->n, address_of(chords->poses));
+    int64_t asked_at = address_of(chords->asked), rows_at = address_of(chords->rows), k;
     memcpy(cast->ray, ray->origin, 3 * sizeof *cast->ray);
     memset(chords->rows, 0, (size_t)(chords->n * CHORD_ROW) * sizeof(double));
     for (k = 0; k < chords->n; k++) chords->limits[k] = ray->limit;
     kernels->cut_parts(chords->ints_at, chords->numbers_at, address_of(chords->poses), address_of(chords->shape_of), asked_at,
-                       address_of(cast->ray), chords->n, 0, rows_at, address_of(cast->doubles), address_of(cast->integers));
-    if (kernels->list_open_chords(chords->ints_at, chords->numbers_at, address_of(chords->shape_of), asked_at, rows_at, limits_at,
-                                  chords->n, 0, address_of(chords->listed)) > 0)
-        return COLLIDE_UNSUPPORTED;
-    places->n = kernels->write_chord_ends(rows_at, asked_at, limits_at, address_of(&cast->exponent), address_of(chords->exact), chords->n,
-                                          address_of(places->t), address_of(places->normals), address_of(places->columns),
-                                          address_of(places->flags));
+                       address_of(cast->ray), chords->n, (uint8_t)both, rows_at, address_of(cast->doubles), address_of(cast->integers));
+    return kernels->list_open_chords(chords->ints_at, chords->numbers_at, address_of(chords->shape_of), asked_at, rows_at,
+                                     address_of(chords->limits), chords->n, (uint8_t)both, address_of(chords->listed));
+}
+
+void write_ends(const struct ray *ray)
+{
+    struct chords *chords = ray->chords;
+    struct places *places = &chords->places;
+    places->n = ray->space->kernels->write_chord_ends(
+        address_of(chords->rows), address_of(chords->asked), address_of(chords->limits), address_of(&ray->space->cast->exponent),
+        address_of(chords->exact), chords->n, address_of(places->t), address_of(places->normals), address_of(places->columns),
+        address_of(places->flags));
+}
+
+/* The ends of the ray's chords in all parts, those of them that count. */
+static collide_status ends_of_chords(const struct ray *ray)
+{
+    struct chords *chords = ray->chords;
+    if (ray->compound != NULL)
+        ray->space->kernels->place_all_parts(address_of(ray->compound->parts), chords->n, address_of(chords->poses));
+    if (cut_chords(ray, 0) > 0) return COLLIDE_UNSUPPORTED;
+    write_ends(ray);
     return COLLIDE_OK;
 }
 
@@ -107,7 +91,7 @@ static collide_status first_of_hits(const struct ray *ray, const double *to_face
     int k;
     if (n == 0) return COLLIDE_OK;
     kernels->group_first_facets(address_of(hits), n, address_of(to_facets), address_of(is_narrow), address_of(groups));
-    if (!groups[2]) return COLLIDE_UNSUPPORTED;
+    if (!groups[2] || (ray->is_strict && (groups[1] > 1 || groups[2] != NARROW))) return COLLIDE_UNSUPPORTED;
     for (k = 0; k < 3; k++) { /* value, from below, from above */
         kernels->scale_facet_t(address_of(hits + FACET_HIT * groups[k == 0 ? 0 : 2 + k]), 1, address_of(to_facets), exponent_at, address_of(t));
         places->t[k] = t[k];
@@ -122,8 +106,7 @@ static collide_status first_of_hits(const struct ray *ray, const double *to_face
                ? COLLIDE_UNSUPPORTED : COLLIDE_OK;
 }
 
-/* The first facet that a ray meets. */
-static collide_status facet_of(const struct ray *ray, struct places *places)
+collide_status facet_of(const struct ray *ray, struct places *places)
 {
     collide_workspace *space = ray->space;
     const collide_mesh *mesh = ray->mesh;
@@ -147,6 +130,7 @@ static collide_status facet_of(const struct ray *ray, struct places *places)
     return status;
 }
 
+/* The row of the ray's first place; of a field items are named as results name them. */
 static void write_hit(const struct ray *ray, struct places *places, collide_ray_hit *hit)
 {
     const struct collide_kernels *kernels = ray->space->kernels;
@@ -170,6 +154,21 @@ static void write_hit(const struct ray *ray, struct places *places, collide_ray_
     hit->certified = places->flags[2 * first + 1];
 }
 
+/* The row of a ray at a field, whose chords take room of their own. */
+static collide_status cast_at_field(const struct ray *ray, collide_ray_hit *hit)
+{
+    struct ray own = *ray;
+    struct chords chords;
+    struct arena arena;
+    collide_status status;
+    arena_begin(&arena);
+    own.chords = &chords;
+    status = places_on_field(&own, &chords, &arena);
+    if (status == COLLIDE_OK) write_hit(&own, &chords.places, hit);
+    arena_end(&arena);
+    return status;
+}
+
 static collide_status cast_ray(struct ray *ray, double max_distance, collide_ray_hit *hit)
 {
     struct cast_space *cast = ray->space->cast;
@@ -185,6 +184,7 @@ static collide_status cast_ray(struct ray *ray, double max_distance, collide_ray
     memcpy(pose, ray->space->poses, POSE * sizeof *pose);
     ray->limit = ldexp(max_distance, (int)cast->exponent);
     places->n = 0;
+    if (ray->field != NULL) return cast_at_field(ray, hit);
     status = ray->mesh != NULL ? facet_of(ray, places) : ends_of_chords(ray);
     if (status == COLLIDE_OK) write_hit(ray, places, hit);
     return status;
@@ -249,19 +249,25 @@ static struct ray_question question_of(collide_poses X, collide_vectors origins,
     return asked;
 }
 
+/* A ray at nothing yet. */
+static struct ray ray_of(collide_workspace *space, unsigned flags)
+{
+    struct ray ray;
+    memset(&ray, 0, sizeof ray);
+    ray.space = space;
+    ray.flags = flags;
+    return ray;
+}
+
 collide_status collide_raycast(collide_workspace *workspace, const collide_shape *shape, collide_poses X_WA, collide_vectors origins,
                                collide_vectors directions, double max_distance, unsigned flags, collide_ray_hit *hits,
                                collide_status *statuses, size_t *failed)
 {
     struct ray_question asked = question_of(X_WA, origins, directions, max_distance, hits, statuses);
-    struct ray ray;
+    struct ray ray = ray_of(workspace, flags);
     collide_status status;
     if (failed != NULL) *failed = 0;
     if (!IS_HANDLE(workspace, WORKSPACE_WORD) || !IS_HANDLE(shape, SHAPE_WORD)) return COLLIDE_INVALID_ARGUMENT;
-    ray.space = workspace;
-    ray.flags = flags;
-    ray.mesh = NULL;
-    ray.compound = NULL;
     if (shape->ints[KIND] == POINTS && shape->numbers[RADIUS] == 0.0 && shape->numbers[SLOP] == 0.0 &&
         (status = surface_of(shape, &ray.mesh)) != COLLIDE_OK)
         return status;
@@ -274,13 +280,10 @@ collide_status collide_mesh_raycast(collide_workspace *workspace, const collide_
                                     collide_status *statuses, size_t *failed)
 {
     struct ray_question asked = question_of(X_WA, origins, directions, max_distance, hits, statuses);
-    struct ray ray;
+    struct ray ray = ray_of(workspace, flags);
     if (failed != NULL) *failed = 0;
     if (!IS_HANDLE(workspace, WORKSPACE_WORD) || !IS_HANDLE(mesh, MESH_WORD) || mesh->radius != 0.0) return COLLIDE_INVALID_ARGUMENT;
-    ray.space = workspace;
-    ray.flags = flags;
     ray.mesh = mesh;
-    ray.compound = NULL;
     return cast_rays(&ray, &asked, failed);
 }
 
@@ -289,14 +292,23 @@ collide_status collide_compound_raycast(collide_workspace *workspace, const coll
                                         collide_ray_hit *hits, collide_status *statuses, size_t *failed)
 {
     struct ray_question asked = question_of(X_WA, origins, directions, max_distance, hits, statuses);
-    struct ray ray;
+    struct ray ray = ray_of(workspace, flags);
     if (failed != NULL) *failed = 0;
     if (!IS_HANDLE(workspace, WORKSPACE_WORD) || !IS_HANDLE(compound, COMPOUND_WORD)) return COLLIDE_INVALID_ARGUMENT;
     if (compound->is_whole)
         return collide_raycast(workspace, compound->shapes[0], X_WA, origins, directions, max_distance, flags, hits, statuses, failed);
-    ray.space = workspace;
-    ray.flags = flags;
-    ray.mesh = NULL;
     ray.compound = compound;
+    return cast_rays(&ray, &asked, failed);
+}
+
+collide_status collide_field_raycast(collide_workspace *workspace, const collide_field *field, collide_poses X_WF, collide_vectors origins,
+                                     collide_vectors directions, double max_distance, unsigned flags, collide_ray_hit *hits,
+                                     collide_status *statuses, size_t *failed)
+{
+    struct ray_question asked = question_of(X_WF, origins, directions, max_distance, hits, statuses);
+    struct ray ray = ray_of(workspace, flags);
+    if (failed != NULL) *failed = 0;
+    if (!IS_HANDLE(workspace, WORKSPACE_WORD) || !IS_HANDLE(field, FIELD_WORD)) return COLLIDE_INVALID_ARGUMENT;
+    ray.field = field;
     return cast_rays(&ray, &asked, failed);
 }

@@ -184,6 +184,11 @@ collide_status refuse_direction(collide_workspace *space, const char *caller, si
    t or distance from below.   n_leaves : of leaves side by side, or -1 for the tree. */
 size_t bodies_ahead(const collide_world *world, struct world_space *own, const double question[SWEEP], int of_points, int64_t n_leaves);
 
+/* capi_world_rays.c: the row of a ray, origin and vector, by n pairs (0, body) of the bodies that it may meet first; those that kernels
+   leave open are COLLIDE_UNSUPPORTED. */
+collide_status settle_ray(const collide_world *world, collide_workspace *space, const double *ray, int64_t exponent, double limit,
+                          const int64_t *pairs, int64_t n, collide_world_hit *hit);
+
 /* capi_world_wholes.c: what a body is, "a voxel grid". */
 const char *kind_of_body(const collide_world *world, int64_t body);
 
@@ -198,7 +203,7 @@ collide_status row_of_whole(const collide_world *world, collide_workspace *space
 /* The row of a shape from outside and a body that is a mesh or a field. */
 collide_status row_from_outside(const collide_world *world, collide_workspace *space, const collide_shape *shape, const double *X_WS,
                                 int64_t body, double limit, collide_pair *row);
-/* Contacts of such a pair of meshes, or of a mesh and a polytope or a ball; COLLIDE_TOO_MANY where `capacity` may not do. */
+/* Contacts of such a pair of meshes, of a mesh and a polytope or a ball, or of a field and a shape; COLLIDE_TOO_MANY where `capacity` may not do. */
 collide_status contacts_of_whole(const collide_world *world, collide_workspace *space, int64_t key, double margin,
                                  size_t max_contacts, collide_contact *rows, size_t capacity, size_t *n);
 

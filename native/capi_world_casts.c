@@ -1,6 +1,7 @@
 /* Shapes moved along a direction through a world, as `cast_shape` of collide/worlds/casts.py: bodies by their boxes on the way, the
-   nearest first, each by `collide_cast`. What that leaves to Python, and meshes and fields in the way, are said to be unsupported. */
+   nearest first, each by `collide_cast` or onto a field. What these leave to Python, and meshes in the way, are said to be unsupported. */
 #include "capi_casts.h"
+#include "capi_field.h"
 #include "capi_world.h"
 
 #include <stdlib.h>
@@ -59,6 +60,24 @@ static void take_hit(struct first_body *first, int64_t body, const collide_first
     first->body = body;
 }
 
+/* The cast onto one body, t up to a limit. Normals of shapes that touch a field at the start are Python's to tell. */
+static collide_status cast_onto_body(const collide_world *world, collide_workspace *space, const struct moved_shape *moved, int64_t body,
+                                     double limit, collide_first_contact *contact, int *is_proven)
+{
+    const double *X_WB = world->X_WBs + 16 * body;
+    const collide_field *field = world->is_whole[body] ? world->wholes[body].field : NULL;
+    unsigned trust = moved->flags & (unsigned)COLLIDE_TRUST_POSES;
+    collide_status status = COLLIDE_UNSUPPORTED;
+    if (field != NULL) {
+        status = cast_onto_field(space, moved->shape, field, moved->X_WS, X_WB, moved->vector, limit, trust, contact, is_proven);
+        if (status == COLLIDE_OK && contact->at_start && moved->flags & COLLIDE_START_NORMALS) status = COLLIDE_UNSUPPORTED;
+    } else if (!world->is_whole[body]) {
+        status = collide_cast(space, moved->shape, shape_of_body(world, body), moved->X_WS, X_WB, moved->vector, limit, moved->flags, contact);
+        *is_proven = status == COLLIDE_OK && space->cast->marks[IS_PROVEN];
+    }
+    return status;
+}
+
 /* Ask candidates in rounds, each of twice as many: those whose boxes may be met no later than what is proven to be met.
    *asked : the body asked last. */
 static collide_status ask_in_order(const collide_world *world, collide_workspace *space, const struct moved_shape *moved, size_t n,
@@ -71,12 +90,10 @@ static collide_status ask_in_order(const collide_world *world, collide_workspace
         for (k = begin; k < n && k < begin + size && candidates[k].bound <= best; k++) {
             int64_t body = *asked = candidates[k].key;
             collide_first_contact contact;
-            collide_status status = COLLIDE_UNSUPPORTED;
-            if (!world->is_whole[body])
-                status = collide_cast(space, moved->shape, shape_of_body(world, body), moved->X_WS, world->X_WBs + 16 * body,
-                                      moved->vector, limit, moved->flags, &contact);
+            int is_proven;
+            collide_status status = cast_onto_body(world, space, moved, body, limit, &contact, &is_proven);
             if (status != COLLIDE_OK) return status;
-            if (contact.hit) take_hit(first, body, &contact, space->cast->marks[IS_PROVEN]);
+            if (contact.hit) take_hit(first, body, &contact, is_proven);
         }
     }
     return COLLIDE_OK;

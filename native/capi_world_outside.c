@@ -170,11 +170,12 @@ static int are_places(const double *points, size_t n, size_t *k)
     return *k == n;
 }
 
-/* One ray: its row, or COLLIDE_UNSUPPORTED where kernels leave its first wall open. */
-static collide_status cast_ray(const collide_world *world, struct world_space *own, const double *ray, int64_t exponent,
+/* One ray: its row, or COLLIDE_UNSUPPORTED where its first wall is left open. */
+static collide_status cast_ray(const collide_world *world, collide_workspace *space, const double *ray, int64_t exponent,
                                double limit, collide_world_hit *hit)
 {
-    int64_t tree[RAY_TREE];
+    struct world_space *own = space->world;
+    int64_t tree[RAY_TREE], n;
     double *integers = own->rays + world->measures[W_RAY_DOUBLES];
     tree[R_NODES_AT] = address_of(world->tree.nodes);
     tree[R_LINKS_AT] = address_of(world->tree.links);
@@ -186,11 +187,12 @@ static collide_status cast_ray(const collide_world *world, struct world_space *o
     tree[R_UNBOUNDED_AT] = address_of(world->unbounded);
     tree[R_N_UNBOUNDED] = (int64_t)world->n_unbounded;
     limit = ldexp(limit, (int)exponent);
-    if (world->kernels->parts_on_rays(address_of(world->table.ints), address_of(world->table.numbers), address_of(world->poses),
-                                      address_of(world->row_of), address_of(tree), address_of(ray), address_of(&limit),
-                                      address_of(&exponent), 1, address_of(hit), address_of(own->pairs), (int64_t)own->n_keys,
-                                      address_of(own->rays), address_of(integers)) > 0)
-        return COLLIDE_UNSUPPORTED;
+    while ((n = world->kernels->parts_on_rays(address_of(world->table.ints), address_of(world->table.numbers), address_of(world->poses),
+                                              address_of(world->row_of), address_of(tree), address_of(ray), address_of(&limit),
+                                              address_of(&exponent), 1, address_of(hit), address_of(own->pairs), (int64_t)own->n_keys,
+                                              address_of(own->rays), address_of(integers))) > (int64_t)own->n_keys)
+        if (!fit_keys(own, (size_t)n)) return COLLIDE_NO_MEMORY;
+    if (n > 0) return settle_ray(world, space, ray, exponent, limit, own->pairs, n, hit);
     if (hit->body >= 0) hit->body = world->ids[hit->body];
     return COLLIDE_OK;
 }
@@ -221,12 +223,12 @@ collide_status collide_world_raycast(const collide_world *world, collide_workspa
             break;
         }
         hits[k] = nothing_met(k);
-        one = cast_ray(world, workspace->world, ray, exponent, max_distance, &hits[k]);
+        one = cast_ray(world, workspace, ray, exponent, max_distance, &hits[k]);
         hits[k].ray = (int32_t)k;
         if (one != COLLIDE_OK) leave_open(&hits[k]);
-        if (one != COLLIDE_OK && first == COLLIDE_OK)
-            first = refuse(workspace->message, one, "%s: ray %zu touches, or begins on, a surface within rounding, or may meet a mesh or a field",
-                           caller, k);
+        if (one == COLLIDE_NO_MEMORY) status = no_memory(workspace);
+        else if (one != COLLIDE_OK && first == COLLIDE_OK)
+            first = refuse(workspace->message, one, "%s: ray %zu touches, or begins on, a surface within rounding", caller, k);
         if (statuses != NULL) statuses[k] = one;
     }
     round_as_before(given);

@@ -154,9 +154,14 @@ collide_status contacts_of_whole(const collide_world *world, collide_workspace *
 {
     struct whole_pair pair = pair_of_key(world, key);
     const collide_mesh *meshes[2];
-    collide_status status = meshes_of(&pair, meshes);
+    collide_status status;
+    int f = field_of(&pair);
     *n = 0;
-    if (status != COLLIDE_OK) return status;
+    if (f >= 0) {
+        struct field_pair of_field = {space, pair.wholes[f]->field, pair.shapes[!f], pair.X[f], pair.X[!f], COLLIDE_TRUST_POSES};
+        return contacts_of_field(&of_field, f, margin, max_contacts, rows, capacity, n);
+    }
+    if ((status = meshes_of(&pair, meshes)) != COLLIDE_OK) return status;
     return collide_mesh_contacts(space, meshes[0], meshes[1], pair.X[0], pair.X[1], margin, max_contacts, COLLIDE_TRUST_POSES, rows,
                                  capacity, n);
 }

@@ -17,8 +17,8 @@
    no program may rely on, since its memory may be another object's by then, or nobody's. Numbers handed in are copied. Queries
    allocate nothing, but for contacts: the first ones of a hull work out its faces, which are kept with it, and the first ones
    of a workspace what manifolds are made in; but for the first casts, motions and unions of a workspace, which make its room
-   for them, and each new pair of unions; but for fields, where a walk leaves a pair open: then a list of the items nearby; and
-   but for worlds, whose lists of pairs are kept with the workspace, and grow.
+   for them, and each new pair of unions; but for fields, where a walk leaves a pair open: then a list of the items nearby, which
+   contacts, casts and rays make shapes of while a call lasts; and but for worlds, whose lists of pairs are kept with the workspace, and grow.
 
    Threads. A shape, a set, a union, a mesh, a field or a robot never changes: any number of threads may use one at once. A workspace is for
    one thread at a time: give each thread its own. A world may be asked by many at once while nobody changes it. Nothing else is
@@ -507,8 +507,8 @@ COLLIDE_API collide_status collide_mesh_raycast(collide_workspace *workspace, co
 
 /* --- fields ---------------------------------------------------------------------------------------------------------
 
-   Point clouds and voxel grids, asked about with convex shapes: whether they meet, and how far they are apart. The field stands
-   first: rows name its balls, or its cells, in part_a, and normals go from it to the shape. Booleans are answered for every shape.
+   Point clouds and voxel grids, asked about with convex shapes: whether they meet, how far they are apart, contacts, casts, and rays.
+   The field stands first, but in casts: rows name its balls, or its cells, in part_a, and normals go from it to the shape. Booleans are answered for every shape.
    Rows are COLLIDE_UNSUPPORTED, never a guess, where Python takes the items nearby as a union: depths and distances that a walk
    leaves open (touching within rounding, matrices off a rotation by 2^-40), and half-spaces, unless a single ball or cell is near:
    the one that is lowest over a half-space. */
@@ -551,6 +551,27 @@ COLLIDE_API collide_status collide_field_distance_batch(collide_workspace *works
                                                         double max_distance, unsigned flags, collide_pair *pairs,
                                                         collide_status *statuses, size_t *failed);
 
+/* Contacts of a field and a shape within a margin: those of the items nearby as a union, cells of a grid as few boxes; where cells meet
+   face to face there are none. Rows are as of collide_compound_contacts, but that part_a names a ball or a cell, at most max_contacts for
+   each ball or box. COLLIDE_UNSUPPORTED, never a guess: what collide_compound_contacts leaves to Python. O(items nearby). */
+COLLIDE_API collide_status collide_field_contacts(collide_workspace *workspace, const collide_field *field, const collide_shape *shape,
+                                                  const double X_WF[16], const double X_WS[16], double margin, size_t max_contacts,
+                                                  unsigned flags, collide_contact *contacts, size_t capacity, size_t *count);
+
+/* Where n rays first meet a field, as collide_raycast: `part` names the ball, or the cell; facet is -1 of cells. Faces between occupied
+   cells are no surface. COLLIDE_UNSUPPORTED, never a guess: rays that graze or pass a cell's edge or a point within rounding before
+   their first wall, begin within rounding of a cell's face, or end at one, and grids at matrices off a rotation by 2^-10. */
+COLLIDE_API collide_status collide_field_raycast(collide_workspace *workspace, const collide_field *field, collide_poses X_WF,
+                                                 collide_vectors origins, collide_vectors directions, double max_distance, unsigned flags,
+                                                 collide_ray_hit *hits, collide_status *statuses, size_t *failed);
+
+/* The first contact of a shape, moved along a direction, and a field, which stands, as collide_compound_cast: part_b names the ball or the
+   cell. flags : COLLIDE_TRUST_POSES or 0. COLLIDE_UNSUPPORTED: a half-space, which Python refuses as well, and items that the shape grazes
+   or touches within rounding. O(items on the way), of which the first ones are looked at first. */
+COLLIDE_API collide_status collide_field_cast(collide_workspace *workspace, const collide_shape *shape, const collide_field *field,
+                                              const double X_WS[16], const double X_WF[16], const double direction[3],
+                                              double max_distance, unsigned flags, collide_first_contact *first);
+
 /* The k >= 1 nearest points of a cloud to each of n places, x y z of each in the frame of the cloud [m], balls left out, nearest
    first, of points as far away as each other those of least number: distances and numbers, k a place; infinite and -1 where there
    are fewer, or none within max_distance >= 0. k * n <= 2^26; a walk sorts by insertion, so that k of some hundred is much. */
@@ -566,8 +587,8 @@ COLLIDE_API collide_status collide_point_cloud_within(const collide_field *cloud
 
    Many bodies, a tree over their boxes, and questions about all of them: the answers of Python's World, row by row and bit by
    bit. Bodies are convex shapes; meshes and fields as well, of which a world says what the pair queries above say: whether they
-   hit, gaps, and contacts of meshes. What these do not answer is COLLIDE_UNSUPPORTED, and the message names the bodies. A change
-   takes its time in the call that makes it: a step moves bodies, and the tree follows. Questions change nothing: any number of
+   hit, gaps, contacts, where rays meet them, and where casts meet fields. What these do not answer is COLLIDE_UNSUPPORTED, and the
+   message names the bodies. A change takes its time in the call that makes it: a step moves bodies, and the tree follows. Questions change nothing: any number of
    threads may ask a world at once, each with its own workspace, while nobody changes it. Shapes, meshes and fields are not
    copied: free them once no body is made of them.
 
@@ -702,7 +723,8 @@ typedef struct collide_world_hit {
 /* The first body on each of n rays, x y z of origins and directions, which need be no unit vectors. max_distance : in lengths
    of the direction. group, mask : NULL, or bit sets: bodies count with (*group & mask_B) and (group_B & *mask). statuses :
    NULL, or room for n. A ray that touches a surface within rounding, or begins on one, Python settles in integers: its status
-   is COLLIDE_UNSUPPORTED, its row zeros, and so is the call's; all others are answered. */
+   is COLLIDE_UNSUPPORTED, its row zeros, and so is the call's; all others are answered, at fields as by `collide_field_raycast`,
+   at meshes that were made of facets where a single facet is met first for certain. */
 COLLIDE_API collide_status collide_world_raycast(const collide_world *world, collide_workspace *workspace, const double *origins_W,
                                                  const double *directions_W, size_t n, double max_distance, const uint32_t *group,
                                                  const uint32_t *mask, collide_world_hit *hits, collide_status *statuses);
@@ -710,9 +732,9 @@ COLLIDE_API collide_status collide_world_raycast(const collide_world *world, col
 /* The first body touched by a shape from outside that moves along a direction, without turning: n casts, poses and directions n of each,
    or 1 that goes with all. Of several touched at the same place the one with the least id. max_distance, flags : as of `collide_cast`;
    group, mask, statuses : as of `collide_world_raycast`. In a row `normal` goes from the shape to the body, and `point` is the body's.
-   COLLIDE_UNSUPPORTED, never a guess, of a cast, whose row is zeros: where `collide_cast` leaves a body to Python that comes before what is
-   proven to be met, and where a mesh or a field does, which the message names; and where the shape is a half-space, which Python refuses
-   as well. O(log n) boxes, and a `collide_cast` for each body in the way, the nearest first. */
+   COLLIDE_UNSUPPORTED, never a guess, of a cast, whose row is zeros: where `collide_cast` or `collide_field_cast` leaves a body to Python
+   that comes before what is proven to be met, where a mesh does, which the message names, and with COLLIDE_START_NORMALS where a field is
+   touched at the start; and where the shape is a half-space, which Python refuses as well. O(log n) boxes, and a `collide_cast` for each body in the way, the nearest first. */
 COLLIDE_API collide_status collide_world_cast(const collide_world *world, collide_workspace *workspace, const collide_shape *shape,
                                               collide_poses X_WS, collide_vectors directions_W, double max_distance, unsigned flags,
                                               const uint32_t *group, const uint32_t *mask, collide_world_hit *hits,

@@ -490,6 +490,13 @@ public:
                                                flags, out...);
         });
     }
+    std::vector<collide_contact> contacts(const Field &field, const Shape &shape, const Pose &X_WF, const Pose &X_WS,
+                                          double margin = 0.0, std::size_t max_contacts = 4, unsigned flags = 0) {
+        return all_rows<collide_contact>([&](auto... out) {
+            return collide_field_contacts(get(), field.get(), shape.get(), X_WF.data(), X_WS.data(), margin, max_contacts, flags,
+                                          out...);
+        });
+    }
 
     // How far A can be moved along a direction until it touches B.
     Answered<collide_first_contact> cast_batch(const Shape &A, const Shape &B, Poses X_WA, Poses X_WB, Vectors directions,
@@ -506,6 +513,13 @@ public:
                                       &first));
         return first;
     }
+    collide_first_contact cast(const Shape &shape, const Field &field, const Pose &X_WS, const Pose &X_WF, const Vector &direction,
+                               double max_distance = infinity, unsigned flags = 0) {
+        collide_first_contact first;
+        require(collide_field_cast(get(), shape.get(), field.get(), X_WS.data(), X_WF.data(), direction.data(), max_distance, flags,
+                                   &first));
+        return first;
+    }
     // When A and B first touch on their ways from the first poses to the second, turning the shortest way.
     Answered<collide_time_of_impact> impact_batch(const Shape &A, const Shape &B, Poses X_WA0, Poses X_WA1, Poses X_WB0,
                                                   Poses X_WB1, double tolerance = 1e-9, unsigned flags = 0) {
@@ -515,7 +529,7 @@ public:
             return collide_impact_batch(get(), A.get(), B.get(), &motions, tolerance, flags, out...);
         });
     }
-    // Where rays first meet a shape, a union or a mesh.
+    // Where rays first meet a shape, a union, a mesh or a field.
     Answered<collide_ray_hit> raycast(const Shape &shape, Poses X_WA, Vectors origins, Vectors directions,
                                       double max_distance = infinity, unsigned flags = 0) {
         return rays(collide_raycast, shape, X_WA, origins, directions, max_distance, flags);
@@ -527,6 +541,10 @@ public:
     Answered<collide_ray_hit> raycast(const Mesh &mesh, Poses X_WA, Vectors origins, Vectors directions,
                                       double max_distance = infinity, unsigned flags = 0) {
         return rays(collide_mesh_raycast, mesh, X_WA, origins, directions, max_distance, flags);
+    }
+    Answered<collide_ray_hit> raycast(const Field &field, Poses X_WF, Vectors origins, Vectors directions,
+                                      double max_distance = infinity, unsigned flags = 0) {
+        return rays(collide_field_raycast, field, X_WF, origins, directions, max_distance, flags);
     }
 
 private:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from collide.contact.contact_rows import no_rows
-from collide.narrowphase.fields.field_items import items_within
+from collide.narrowphase.fields.field_items import items_within, turned_back
 from collide.narrowphase.fields.items_of import items_of
 from collide.pairs.pair_arguments import pose_at
 from collide.shapes.shape import Shape
@@ -49,7 +49,7 @@ def _contacts_of(rows_of: RowsOf, shapes: list, poses: list, margin: float) -> n
     for side, items, union in fields:
         part, point = ("part_a", "point_a") if side == 0 else ("part_b", "point_b")
         X_WF, outwards = poses[side], rows["normal"] if side == 0 else -rows["normal"]
-        p_F, n_F = (rows[point] - X_WF[:3, 3]) @ X_WF[:3, :3], outwards @ X_WF[:3, :3]
+        p_F, n_F = turned_back(X_WF[:3, :3], rows[point] - X_WF[:3, 3]), turned_back(X_WF[:3, :3], outwards)
         name = f"facet{part[-2:]}" if union.names_facets else part
         if union.names_facets:  # corners and edges have numbers in the mesh made for this question
             rows[f"feature{part[-2:]}"] = -1

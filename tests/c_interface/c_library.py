@@ -164,6 +164,16 @@ _TYPES = {
     "collide_field_distance_batch": [
         c_void_p, c_void_p, c_void_p, Poses, Poses, c_double, c_uint, c_void_p, c_void_p, POINTER(c_size_t),
     ],
+    "collide_field_contacts": [
+        c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_size_t, c_uint, c_void_p, c_size_t,
+        POINTER(c_size_t),
+    ],
+    "collide_field_raycast": [
+        c_void_p, c_void_p, Poses, Vectors, Vectors, c_double, c_uint, c_void_p, c_void_p, POINTER(c_size_t),
+    ],
+    "collide_field_cast": [
+        c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_uint, c_void_p,
+    ],
     "collide_point_cloud_nearest": [c_void_p, c_void_p, c_size_t, c_size_t, c_double, c_void_p, c_void_p],
     "collide_point_cloud_within": [c_void_p, c_void_p, c_double, c_void_p, c_size_t, POINTER(c_size_t)],
     "collide_world_create": [c_void_p],
@@ -478,9 +488,10 @@ class Asker:
         return status, out, failed.value
 
     def cast(self, A, B, X_WA, X_WB, direction, limit: float = math.inf, flags: int = 0):
-        """(status, row) of two `CShape` or `CCompound`."""
+        """(status, row) of two `CShape` or `CCompound`; or of a `CShape` onto a `CField`."""
         rows, X_WA, X_WB, direction = np.full(1, 7, dtype=FIRST_CONTACT), *map(_doubles, (X_WA, X_WB, direction))
         name = "collide_cast" if isinstance(A, CShape) else "collide_compound_cast"
+        name = "collide_field_cast" if isinstance(B, CField) else name
         status = getattr(library(), name)(
             self.handle, A.handle, B.handle, X_WA.ctypes.data, X_WB.ctypes.data, direction.ctypes.data, limit, flags,
             rows.ctypes.data,
@@ -525,12 +536,15 @@ class Asker:
         return status, rows, statuses, failed.value
 
     def rays(self, shape, X_WA, origins, directions, limit: float = math.inf, flags: int = 0):
-        """(status, rows, their statuses, number of the ray to blame).   shape : a `CShape`, `CMesh` or `CCompound`."""
+        """(status, rows, their statuses, number of the ray to blame).
+
+        shape : a `CShape`, `CMesh`, `CCompound` or `CField`.
+        """
         X_WA, failed = _doubles(X_WA).reshape(-1, 4, 4), c_size_t(0)
         origins, directions = (_doubles(values).reshape(-1, 3) for values in (origins, directions))
         n = max(len(X_WA), len(origins), len(directions))
         rows, statuses = np.full(n, 7, dtype=RAY_HIT), np.full(n, -1, dtype=np.int32)
-        name = {CMesh: "mesh_", CCompound: "compound_"}.get(type(shape), "")
+        name = {CMesh: "mesh_", CCompound: "compound_", CField: "field_"}.get(type(shape), "")
         status = getattr(library(), f"collide_{name}raycast")(
             self.handle, shape.handle, Poses(X_WA.ctypes.data, len(X_WA)), Vectors(origins.ctypes.data, len(origins)),
             Vectors(directions.ctypes.data, len(directions)), limit, flags, rows.ctypes.data, statuses.ctypes.data,
@@ -555,6 +569,7 @@ class Asker:
         X_WA, X_WB = _doubles(X_WA), _doubles(X_WB)
         name = "collide_mesh_contacts" if isinstance(B, CMesh) else "collide_compound_contacts"
         name = "collide_mesh_shape_contacts" if isinstance(B, CShape) else name
+        name = "collide_field_contacts" if isinstance(A, CField) else name
         status = getattr(library(), name)(
             self.handle, A.handle, B.handle, X_WA.ctypes.data, X_WB.ctypes.data, margin, max_contacts, flags,
             rows.ctypes.data, capacity, count,

@@ -58,6 +58,50 @@ static void set_pose(double *X, int k)
     X[11] = 0.9 * (k / 12);
 }
 
+/* A cloud and a grid, and terrain, asked about with a box; a sum of all answers. Of few items, that fit where qsort sorts without
+   memory of its own. */
+static unsigned long fields(const collide_shape *box, const double *points, unsigned long sum)
+{
+    static const uint8_t cells[12] = {1, 0, 1, 1, 1, 1, 0, 1, 1, 1, 0, 1};
+    static const double heights[9] = {0.1, 0.3, 0.2, 0.0, 0.4, 0.1, 0.2, 0.0, NAN}, sides[3] = {0.3, 0.2, 0.25}, way[3] = {0.1, 0.2, -1};
+    const size_t along[3] = {2, 3, 2};
+    double X[16], Y[16];
+    collide_contact contacts[64];
+    collide_first_contact first;
+    collide_ray_hit hit;
+    collide_field *grid = NULL, *cloud = NULL;
+    collide_mesh *terrain = NULL;
+    collide_workspace *workspace = NULL;
+    collide_status status;
+    size_t count;
+    int k;
+    set_pose(X, 0);
+    set_pose(Y, 0);
+    Y[3] = 0.31, Y[7] = 0.23, Y[11] = 0.7;
+    TRY(collide_workspace_create(&workspace));
+    TRY(collide_point_cloud_create(points, 40, sides, 1, &cloud));
+    TRY(collide_voxel_grid_create(cells, along, sides, NULL, &grid));
+    TRY(collide_height_field_create(heights, 3, 3, sides, NULL, &terrain));
+    for (k = 0; k < 2; k++) {
+        const collide_field *field = k ? cloud : grid;
+        const collide_poses here = {X, 1};
+        const collide_vectors from = {Y + 3, 1}, towards = {way, 1};
+        TRY(collide_field_contacts(workspace, field, box, X, Y, 0.1, 8, 0, contacts, 64, &count));
+        sum = add_up(sum, contacts, count * sizeof *contacts);
+        TRY(collide_field_cast(workspace, box, field, Y, X, way, INFINITY, 0, &first));
+        sum = add_up(sum, &first, sizeof first);
+        TRY(collide_field_raycast(workspace, field, here, from, towards, INFINITY, 0, &hit, NULL, NULL));
+        sum = add_up(sum, &hit, sizeof hit);
+    }
+    TRY(collide_mesh_shape_collide(workspace, terrain, box, X, Y, 0, &k));
+    sum = add_up(sum, &k, sizeof k);
+    collide_mesh_free(terrain);
+    collide_field_free(cloud);
+    collide_field_free(grid);
+    collide_workspace_free(workspace);
+    return sum;
+}
+
 /* Bodies that are added, moved, replaced and removed, and questions about them; a sum of all answers. */
 static unsigned long scene(collide_shape *const *shapes, const collide_mesh *mesh, const collide_field *cloud)
 {
@@ -138,7 +182,7 @@ int main(void)
             collide_point_cloud_create(points, 250, radii, 1, &cloud))
             return 1;
         n_allocations = 0;
-        found = scene(shapes, mesh, cloud);
+        found = fields(shapes[0], points, scene(shapes, mesh, cloud));
         if (n < 0) {
             n = n_allocations;
             sum = found;

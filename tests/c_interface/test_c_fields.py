@@ -10,6 +10,7 @@ from collections import Counter
 import c_library as c
 import numpy as np
 import pytest
+from field_cases import EYE, cases, cloud_of, field_and_own, poses_about, shapes
 
 import collide
 from collide.kernels import mode
@@ -18,92 +19,12 @@ from collide.results import PAIR_DTYPE
 if mode.MODE != mode.COMPILED:
     pytest.skip(f"kernels are not those of the library: {mode.WHY}", allow_module_level=True)
 
-EYE = np.eye(4)
 NOTHING = bytes(PAIR_DTYPE.itemsize)
-#: Matrices of zeros and ones.
-_TURNS = [np.eye(3), np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])]
-_PLANES = np.vstack([3.0 * np.eye(3), [[-1.0, -1.0, -3.0]]])  # corners at thirds
-
-
-def _shapes(random) -> list[collide.Shape]:
-    """Of all kinds, about 0.3 m large, many of sizes that are eighths."""
-    size, points, normal = random.integers(1, 5, 3) / 8.0, random.normal(size=(64, 3)), 1.0 * random.integers(-2, 3, 3)
-    normal[2] += 0.5
-    return [
-        collide.Box(size), collide.Sphere(0.25), collide.Capsule(0.125, 0.25), collide.ConvexHull(0.2 * points),
-        collide.Cylinder(0.125, 0.25), collide.Halfspace(normal, random.normal()),
-        collide.Box(random.uniform(0.05, 0.5, 3)), collide.Cone(0.25, 0.25), collide.Ellipsoid((0.25, 0.125, 0.125)),
-        collide.ConvexHull(0.15 * points[:20], radius=0.125), collide.ConvexHull(random.normal(size=(300, 3)) * 0.1),
-        collide.HPolytope(_PLANES, 0.4 * np.ones(4)), collide.ConvexHull(points[:1] * 0.1),
-    ]
-
-
-def _cloud(random) -> collide.PointCloud:
-    """Few points on eighths or many anywhere; without a radius, with one, or one each."""
-    grid = random.integers(-6, 7, (40, 3)) / 8.0
-    points = [grid, np.repeat(grid[:8], 5, axis=0), random.normal(size=(400, 3)), random.normal(size=(1, 3))]
-    chosen = points[random.integers(4)]
-    radii = [0.0, 0.125, 0.05, random.integers(0, 3, len(chosen)) / 8.0]
-    return collide.PointCloud(chosen, radii[random.integers(4)])
-
-
-def _grid(random) -> tuple[collide.VoxelGrid, np.ndarray]:
-    """(grid, array) of some cells, at the origin or shifted."""
-    occupied = random.random(random.integers(1, 20, 3)) < random.choice([0.02, 0.2, 0.9])
-    occupied.flat[random.integers(occupied.size)] = True
-    cell = (0.125, 0.125, 0.25) if random.random() < 0.5 else random.uniform(0.05, 0.3, 3)
-    X = c.identity_at(*(random.integers(-8, 9, 3) / 8.0 if random.random() < 0.5 else random.normal(size=3)))
-    return collide.VoxelGrid(occupied, cell, EYE if random.random() < 0.3 else X), occupied
-
-
-def _field(random, number: int) -> tuple[collide.Shape, c.CField]:
-    if number % 2:
-        cloud = _cloud(random)
-        return cloud, c.CField(cloud)
-    grid, occupied = _grid(random)
-    return grid, c.CField(grid, occupied)
-
-
-def _poses(random, field) -> tuple[np.ndarray, np.ndarray]:
-    """Quarter turns and eighths, where bodies are flush, or any; the shape about an item of the field."""
-    X, Y = EYE.copy(), EYE.copy()
-    items = field.points if isinstance(field, collide.PointCloud) else field.cells * field.cell + field.X[:3, 3]
-    item = items[random.integers(len(items))]
-    if random.random() < 0.5:
-        X[:3, :3], Y[:3, :3] = _TURNS[random.integers(3)], _TURNS[random.integers(3)]
-        X[:3, 3], beside = random.integers(-4, 5, 3) / 8.0, random.integers(-4, 5, 3) / 8.0
-    else:
-        X, Y = (collide.pose(random.normal(size=3), quat_wxyz=random.normal(size=4)) for _ in range(2))
-        beside = random.normal(size=3) * random.choice([0.05, 0.3, 1.0])
-    Y[:3, 3] = X[:3, :3] @ (item + beside) + X[:3, 3]
-    return X, Y
-
-
-def _near_touching(random, field, shape, X, Y) -> np.ndarray:
-    """The shape's pose moved to where it touches, but for a gap or an overlap of 1e-17 to 1e-6 m."""
-    row = collide.distance(field, shape, X, Y, signed=False).rows[0]
-    Y = Y.copy()
-    Y[:3, 3] -= row["normal"] * (row["distance"] + random.choice([-1.0, 0.0, 1.0]) * 10.0 ** random.uniform(-17, -6))
-    return Y
-
-
-def _cases(seed: int, n: int):
-    """(name, field, shape, their handles, poses)."""
-    for number in range(n):
-        random = np.random.default_rng([seed, number])
-        field, own = _field(random, number)
-        shape = _shapes(random)[number // 2 % 13]
-        X, Y = _poses(random, field)
-        if number % 3 == 0:
-            Y = _near_touching(random, field, shape, X, Y)
-        yield f"case {number} of {seed}: {field!r}, {shape!r}", field, shape, own, c.CShape(shape), X, Y
-
-
 @pytest.mark.many(2)
 @pytest.mark.parametrize("seed", range(910, 914))
 def test_booleans_are_pythons_and_none_is_left_out(seed):
     asker, told = c.Asker(), Counter()
-    for name, field, shape, F, S, X, Y in _cases(seed, 400):
+    for name, field, shape, F, S, X, Y in cases(seed, 400):
         wanted = collide.collide(field, shape, X, Y)
         assert asker.field_meets(F, S, X, Y) == (c.OK, wanted), name
         told[wanted] += 1
@@ -115,7 +36,7 @@ def test_booleans_are_pythons_and_none_is_left_out(seed):
 @pytest.mark.parametrize("flags", [c.UNSIGNED, 0])
 def test_rows_are_pythons_or_left_to_python(flags, seed):
     asker, told = c.Asker(), Counter()
-    for number, (name, field, shape, F, S, X, Y) in enumerate(_cases(seed, 250)):
+    for number, (name, field, shape, F, S, X, Y) in enumerate(cases(seed, 250)):
         limit = (math.inf, 0.0, 0.2)[number % 3]
         status, row = asker.field_gap(F, S, X, Y, flags, limit)
         wanted = collide.distance(field, shape, X, Y, signed=not flags, max_distance=limit).rows
@@ -142,7 +63,7 @@ def _off(random, k: int, X, Y) -> tuple[np.ndarray, np.ndarray, int]:
 
 def test_matrices_off_a_rotation_are_answered_alike():
     asker, told = c.Asker(), Counter()
-    for k, (name, field, shape, F, S, X, Y) in enumerate(_cases(93, 300)):
+    for k, (name, field, shape, F, S, X, Y) in enumerate(cases(93, 300)):
         X, Y, flags = _off(np.random.default_rng([93, k, 1]), k, X, Y)
         wanted = collide.collide(field, shape, X, Y, check_poses=not flags)
         assert asker.field_meets(F, S, X, Y, flags) == (c.OK, wanted), name
@@ -158,9 +79,9 @@ def test_batches_answer_as_single_calls_do():
     asker, told = c.Asker(), Counter()
     for number in range(26):
         random = np.random.default_rng([94, number])
-        field, F = _field(random, number)
-        shape = _shapes(random)[number % 13]
-        S, (X, Y) = c.CShape(shape), np.array([_poses(random, field) for _ in range(15)]).transpose(1, 0, 2, 3)
+        field, F = field_and_own(random, number)
+        shape = shapes(random)[number % 13]
+        S, (X, Y) = c.CShape(shape), np.array([poses_about(random, field) for _ in range(15)]).transpose(1, 0, 2, 3)
         X = X if number % 3 else X[:1]
         pairs = list(zip(np.broadcast_to(X, Y.shape), Y))
         status, hits, _, failed = asker.field_batch(F, S, X, Y, boolean=True)
@@ -220,7 +141,7 @@ def test_nearest_points_and_points_within_are_pythons():
     n_found = n_within = 0
     for number in range(60):
         random = np.random.default_rng([96, number])
-        cloud = _cloud(random) if number % 4 else collide.PointCloud(random.normal(size=(5000, 3)))
+        cloud = cloud_of(random) if number % 4 else collide.PointCloud(random.normal(size=(5000, 3)))
         F, places = c.CField(cloud), np.vstack([random.normal(size=(8, 3)), random.integers(-8, 9, (8, 3)) / 8.0])
         k, limit = int(random.choice([1, 2, 7, len(cloud) + 3, 600])), float(random.choice([math.inf, 0.5, 0.25, 0.0]))
         wanted = cloud.nearest(places, k, max_distance=limit)
@@ -243,15 +164,15 @@ def test_nearest_points_and_points_within_are_pythons():
 
 
 def test_four_threads_share_a_field():
-    cases, wrong = list(_cases(97, 200)), []
+    asked, wrong = list(cases(97, 200)), []
     asker = c.Asker()
-    wanted = [(asker.field_meets(F, S, X, Y), asker.field_gap(F, S, X, Y)) for *_, F, S, X, Y in cases]
+    wanted = [(asker.field_meets(F, S, X, Y), asker.field_gap(F, S, X, Y)) for *_, F, S, X, Y in asked]
 
     def ask(first: int) -> None:
         own = c.Asker()
-        for k in range(len(cases)):
-            k = (k + first) % len(cases)
-            *_, F, S, X, Y = cases[k]
+        for k in range(len(asked)):
+            k = (k + first) % len(asked)
+            *_, F, S, X, Y = asked[k]
             (status, row), ((_, hit), (other, as_alone)) = own.field_gap(F, S, X, Y), wanted[k]
             if own.field_meets(F, S, X, Y) != (c.OK, hit) or status != other or row.tobytes() != as_alone.tobytes():
                 wrong.append(k)

@@ -447,7 +447,7 @@ def test_of_bodies_touched_at_the_same_place_the_least_id_is_told():
 
 
 def test_casts_leave_what_comes_before_a_mesh_answered():
-    """A ball before a mesh is met and told of; behind it, or with nothing but a cloud ahead, the cast is open."""
+    """A ball before a mesh, or a cloud ahead, is met and told of; behind the mesh the cast is open."""
     python, own, ball = collide.World(), CWorld(), collide.Sphere(0.5)
     mesh = soak_pairs.shape("solid", 1.0, np.random.default_rng(98))
     cloud = collide.PointCloud([[0.0, 0, 0]], 0.1)
@@ -457,10 +457,11 @@ def test_casts_leave_what_comes_before_a_mesh_answered():
     X_WS = np.stack([c.identity_at(x, 0, 0) for x in (-20.0, -5.0, 30.0, 30.0)])
     directions = np.array([[2.0, 0, 0], [1.0, 0, 0], [1.0, 0, 0], [0.0, 1.0, 0]])
     status, rows, statuses = own.cast(held[2][1], X_WS, directions)
-    assert status == c.UNSUPPORTED and statuses.tolist() == [c.OK, c.UNSUPPORTED, c.UNSUPPORTED, c.OK]
+    assert status == c.UNSUPPORTED and statuses.tolist() == [c.OK, c.UNSUPPORTED, c.OK, c.OK]
     assert own.question_message.startswith("collide_world_cast: cast 1 and body 0: onto a mesh: "), own.question_message
-    assert are_equal(python.shape_cast(ball, X_WS, directions).rows[[0, 3]], rows[[0, 3]]) and rows["body"][0] == 2
-    assert rows["ray"].tolist() == [0, 1, 2, 3] and not any(rows[1:3][name].any() for name in ("hit", "certified"))
+    wanted = python.shape_cast(ball, X_WS, directions).rows[[0, 2, 3]]
+    assert are_equal(wanted, rows[[0, 2, 3]]) and wanted["body"].tolist() == [2, 1, -1]
+    assert rows["ray"].tolist() == [0, 1, 2, 3] and not any(rows[1][name] for name in ("hit", "certified"))
     assert own.cast(held[2][1], X_WS[1], directions[1], 1.0)[0] == c.OK
 
 
@@ -516,7 +517,7 @@ def test_meshes_and_fields_have_pythons_answers_or_none(seed):
         for step in range(6):
             change_wholes(random, python, own, held)
             ask_wholes(python, own, tally, (seed, number, step))
-    wanted = "hits answered", "pairs", "rows", "hit", "rays hit", "minimum", "query", "nearest"
+    wanted = "hits answered", "pairs", "rows", "hit", "rays hit", "rays at meshes", "minimum", "query", "nearest"
     few = [what for what in wanted if tally[what] < 4]
     assert not few and tally["hit"] < tally["hits answered"], (few, tally)
 
@@ -560,6 +561,8 @@ def ask_wholes(python: collide.World, own: CWorld, tally: collections.Counter, n
     _, rows, statuses = own.raycast(origins, directions)
     answered = statuses == c.OK
     assert are_equal(python.raycast(origins, directions).rows[answered], rows[answered]), name
+    met = rows["body"][answered & rows["hit"].astype(bool)]
+    tally["rays at meshes"] += int(sum(isinstance(python.body(int(k)).shape, collide.Mesh) for k in met))
     tally["rays"] += int(answered.sum())
     tally["rays hit"] += int(rows["hit"].sum())
 
@@ -611,6 +614,51 @@ def test_contacts_on_a_terrain_have_pythons_bits():
     assert n_answered >= 8 and n_rows >= 100, (n_answered, n_rows)
 
 
+@pytest.mark.many(2)
+@pytest.mark.parametrize("seed", range(4))
+def test_contacts_casts_and_rays_at_fields_have_pythons_bits(seed):
+    """Shapes about a cloud and a grid, which are added before them or behind them."""
+    tally = collections.Counter()
+    for number in range(12):
+        random, python, own, held = np.random.default_rng([96, seed, number]), collide.World(), CWorld(), []
+        occupied = random.random((6, 6, 6)) < 0.3
+        cloud, grid = collide.PointCloud(random.normal(size=(200, 3)), 0.05), collide.VoxelGrid(occupied, 0.2)
+        fields = [(cloud, c.CField(cloud)), (grid, c.CField(grid, occupied))]
+        kinds = random.choice(["box", "sphere", "capsule", "hull", "cylinder"], 6)
+        bodies = [(one, c.CShape(one)) for one in (soak_pairs.shape(str(kind), 0.4, random) for kind in kinds)]
+        poses = [drawn_pose(random), drawn_pose(random)]
+        places = cloud.points, 0.2 * grid.cells + 0.1
+        items = [X[:3, :3] @ p + X[:3, 3] for X, of_field in zip(poses, places) for p in of_field]
+        for shape, in_c in fields + bodies if number % 2 else bodies + fields:
+            X, (group, mask) = drawn_pose(random), _OF_CONVEX
+            X[:3, 3] = items[random.integers(len(items))] + 0.2 * random.normal(size=3)
+            if shape.is_field:
+                X, (group, mask) = poses[shape is grid], _OF_FIELDS
+            assert own.add(in_c, X, False, group, mask) == (c.OK, python.add(shape, X, group=group, mask=mask))
+            held.append(in_c)
+        status, rows = own.contacts(0.05)
+        if status == c.OK:
+            assert rows.tobytes() == python.contacts(0.05).rows.tobytes(), (seed, number)
+            tally["contacts"] += len(rows)
+        tally["contacts", status] += 1
+        starts = np.stack([drawn_pose(random) for _ in range(8)])
+        starts[:, :3, 3] *= 2.0
+        ways = np.array(items)[random.integers(len(items), size=8)] + 0.1 * random.normal(size=3) - starts[:, :3, 3]
+        asked = (
+            ("cast", python.shape_cast(bodies[0][0], starts, ways), own.cast(bodies[0][1], starts, ways)),
+            ("ray", python.raycast(starts[:, :3, 3], ways), own.raycast(starts[:, :3, 3], ways)),
+        )
+        for what, wanted, (_, rows, statuses) in asked:
+            answered = statuses == c.OK
+            assert are_equal(wanted.rows[answered], rows[answered]), (seed, number, what)
+            is_field = np.isin(wanted.rows["body"], [k for k in python.ids if python.body(k).shape.is_field])
+            tally[what, "answered"] += int((answered & is_field).sum())
+            tally[what, "open"] += int((~answered).sum())
+    assert tally["contacts", c.OK] >= 6 and tally["contacts"] >= 30, tally
+    for what in ("cast", "ray"):
+        assert tally[what, "answered"] >= 20 and tally[what, "open"] < 0.2 * tally[what, "answered"], tally
+
+
 def test_margins_beside_meshes_and_fields_have_pythons_answers_or_none():
     """Whether bodies come within their margins, and the rows of those, where nothing overlaps a mesh."""
     tally = collections.Counter()
@@ -653,13 +701,13 @@ def test_questions_that_meshes_are_not_asked_are_refused_by_name():
     for text, questions in asked.items():
         for question in questions:
             assert question()[0] == c.UNSUPPORTED and own.question_message.startswith(text), own.question_message
-    scan, cells = c.CField(collide.PointCloud([[0.0, 0, 0]], 0.2)), np.ones((1, 1, 1), dtype=bool)
+    scan, cells = c.CField(collide.PointCloud(np.eye(3) * 0.1, 0.2)), np.ones((1, 1, 2), dtype=bool)
     grid = c.CField(collide.VoxelGrid(cells, 1.0), cells)
     for part, kind in ((scan, "a point cloud and a convex shape"), (grid, "a voxel grid and a convex shape")):
         beside = CWorld()
         beside.add(part, np.eye(4))
-        beside.add(ball, np.eye(4))
-        assert beside.contacts()[0] == c.UNSUPPORTED and f"of {kind}: " in beside.question_message
+        beside.add(ball, c.identity_at(0, 0, 1.0) if part is grid else np.eye(4))
+        assert beside.collisions()[0] == c.UNSUPPORTED and f"of {kind}: " in beside.question_message
     python = collide.World()
     python.add(mesh)
     python.add(collide.Sphere(0.1), c.identity_at(*np.asarray(mesh.vertices)[0]))

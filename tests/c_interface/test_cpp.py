@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from naive import rng_of
 from random_robots import random_configurations, random_robot
+from test_c_casts import told as told_of_cast
+from test_c_rays import told as told_of_ray
 
 import collide
 from collide.contact.contact_rows import CONTACT_DTYPE
@@ -51,6 +53,7 @@ def _run(program: Path) -> bytes:
 _ANSWERS = r"""
 #include <collide.hpp>
 #include <cstdio>
+#include <limits>
 using namespace collide;
 
 template <class Rows> void put(const Rows &rows) { std::fwrite(rows.data(), sizeof *rows.data(), rows.size(), stdout); }
@@ -116,6 +119,16 @@ int main() {
     cells[3] = cells[17] = 1;
     Field grid = Field::voxel_grid(cells, {2, 3, 4}, {0.1, 0.1, 0.1}, {1.0, 0.0, 0.0});
     put(space.distance(grid, shapes[0], here, here));
+    put(space.contacts(grid, shapes[1], here, Pose::at(1.05, 0.1, 0.71), 0.06, 4));
+    put(space.contacts(cloud, shapes[1], here, Pose::at(0.32, 0.31, 0.93), 0.06, 4));
+    const Pose under = Pose::at(0.35, 0.33, -2.0);
+    put(std::array<collide_first_contact, 1>{space.cast(shapes[2], cloud, under, here, {0.02, -0.03, 1.0})});
+    const std::array<double, 6> origins = {1.15, 0.13, 5.0, 1.04, 0.05, -3.0};
+    const std::array<double, 6> ways = {0.0, 0.001, -1.0, 0.001, 0.0, 1.0};
+    put(space.raycast(grid, here, origins, ways).rows);
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    const std::array<double, 9> heights = {0.1, 0.3, 0.2, 0.0, 0.4, 0.1, 0.2, 0.0, nan};
+    put(space.distance(Mesh::height_field(heights, 3, {0.5, 0.25}, -1.0), shapes[0], here, Pose::at(0.1, 0.0, 1.0)));
 }
 """
 
@@ -176,7 +189,16 @@ def test_every_class_has_pythons_bits(tmp_path):
     cells[[3, 17]] = True
     grid = collide.VoxelGrid(cells.reshape(2, 3, 4), 0.1, _at(1, 0, 0))
     reads(collide.distance(grid, sphere, here, here, signed=False).rows, "distance of a grid")
-    assert place == len(told)
+    reads(collide.contacts(grid, box, here, _at(1.05, 0.1, 0.71), margin=0.06, max_contacts=4).rows, "on a grid")
+    reads(collide.contacts(cloud, box, here, _at(0.32, 0.31, 0.93), margin=0.06, max_contacts=4).rows, "on a cloud")
+    met = collide.shape_cast(capsule, _at(0.35, 0.33, -2), (0.02, -0.03, 1.0), cloud, here)
+    reads(told_of_cast(met), "cast onto a cloud")
+    hits = collide.raycast(grid, here, [[1.15, 0.13, 5.0], [1.04, 0.05, -3.0]], [[0, 0.001, -1.0], [0.001, 0, 1.0]])
+    reads(np.array([told_of_ray(hits, k) for k in range(2)]), "rays at a grid")
+    heights = [[0.1, 0.3, 0.2], [0.0, 0.4, 0.1], [0.2, 0.0, np.nan]]
+    terrain = collide.HeightField(heights, (0.5, 0.25), bottom=-1.0)
+    reads(collide.distance(terrain, sphere, here, _at(0.1, 0, 1), signed=False).rows, "distance of a height field")
+    assert hits.hit.all() and place == len(told)
 
 
 def _at(*xyz: float) -> np.ndarray:

@@ -683,6 +683,7 @@ static void ask_cast(struct caller *c)
 {
     const collide_shape *A = A_SHAPE(c), *B = A_SHAPE(c);
     const collide_compound *C = A_COMPOUND(c), *D = A_COMPOUND(c);
+    const collide_field *F = A_FIELD(c);
     double X[16 * 6], Y[16 * 6], v[18], limit = limit_of(c);
     size_t n = 1 + below(&c->s, 6), most;
     collide_poses Xs = some_poses(c, X, n), Ys = some_poses(c, Y, n);
@@ -690,7 +691,7 @@ static void ask_cast(struct caller *c)
     unsigned flags = flags_and(c, COLLIDE_START_NORMALS);
     most = longest(longest(Xs.count, Ys.count), vs.count);
     c->is_bad = 0; /* handles of other calls */
-    switch (below(&c->s, 3)) {
+    switch (below(&c->s, 4)) {
     case 0:
         ASK(c, sizeof(collide_first_contact), collide_cast(c->space, A, B, X, Y, v, limit, flags, c->out));
         if (IS_OK(c)) check_cast(c, 1);
@@ -701,6 +702,10 @@ static void ask_cast(struct caller *c)
                                &c->reply->failed));
         if (IS_OK(c)) check_cast(c, most);
         check_failed(c, most);
+        break;
+    case 2:
+        ASK(c, sizeof(collide_first_contact), collide_field_cast(c->space, A, F, X, Y, v, limit, flags & 1, c->out));
+        if (IS_OK(c)) check_cast(c, 1);
         break;
     default:
         ASK(c, sizeof(collide_first_contact), collide_compound_cast(c->space, C, D, X, Y, v, limit, flags, c->out));
@@ -814,6 +819,7 @@ static void ask_rays(struct caller *c)
     const collide_shape *A = A_SHAPE(c);
     const collide_compound *C = A_COMPOUND(c);
     const collide_mesh *M = A_MESH(c);
+    const collide_field *F = A_FIELD(c);
     double X[16 * 6], o[18], d[18], limit = limit_of(c);
     size_t n = 1 + below(&c->s, 6), most, k;
     collide_poses Xs = some_poses(c, X, n);
@@ -821,7 +827,10 @@ static void ask_rays(struct caller *c)
     unsigned flags = flags_of(c);
     most = longest(longest(Xs.count, os.count), ds.count);
     c->is_bad = 0;
-    switch (below(&c->s, 3)) {
+    switch (below(&c->s, 4)) {
+    case 2: ASK(c, most * sizeof(collide_ray_hit),
+                collide_field_raycast(c->space, F, Xs, os, ds, limit, flags, c->out, c->reply->statuses,
+                                      &c->reply->failed)); break;
     case 0: ASK(c, most * sizeof(collide_ray_hit), collide_raycast(c->space, A, Xs, os, ds, limit, flags, c->out,
                                                                    c->reply->statuses, &c->reply->failed)); break;
     case 1: ASK(c, most * sizeof(collide_ray_hit),
@@ -846,15 +855,15 @@ static void ask_fields(struct caller *c)
 {
     const collide_field *F = A_FIELD(c);
     const collide_shape *S = A_SHAPE(c);
-    double X[16 * 6], Y[16 * 6], limit = limit_of(c), places[18];
-    size_t n = 1 + below(&c->s, 6), both, k = 1 + below(&c->s, 9), capacity = capacity_of(c), i;
+    double X[16 * 6], Y[16 * 6], limit = limit_of(c), margin = margin_of(c), places[18];
+    size_t n = 1 + below(&c->s, 6), most = 1 + below(&c->s, 10), both, k = 1 + below(&c->s, 9), capacity = capacity_of(c), i;
     collide_poses Xs = some_poses(c, X, n), Ys = some_poses(c, Y, n);
     unsigned flags = flags_and(c, COLLIDE_UNSIGNED);
     both = longest(Xs.count, Ys.count);
     if (both == 0) c->is_bad = 0; /* nothing is asked */
     for (i = 0; i < 18; i++) places[i] = coordinate(&c->s, 1.0);
     c->is_bad = 0;
-    switch (below(&c->s, 6)) {
+    switch (below(&c->s, 7)) {
     case 0: ASK(c, 0, collide_field_collide(c->space, F, S, X, Y, flags, &c->reply->hit)); check_hit(c); return;
     case 1:
         ASK(c, sizeof(collide_pair), collide_field_distance(c->space, F, S, X, Y, limit, flags, ROW));
@@ -870,6 +879,11 @@ static void ask_fields(struct caller *c)
         if (IS_OK(c)) check_pairs(c, both);
         break;
     case 4:
+        ASK(c, capacity * sizeof(collide_contact), collide_field_contacts(c->space, F, S, X, Y, margin, most, flags & 1, CONTACTS,
+                                                                          capacity, &c->reply->count));
+        check_contacts(c, rows_written(c, capacity));
+        return;
+    case 5:
         ASK(c, 6 * 9 * sizeof(int64_t),
             (c->space != NULL ? collide_point_cloud_nearest(F, places, n, k, limit, c->reply->doubles, c->out)
                               : COLLIDE_INVALID_ARGUMENT));

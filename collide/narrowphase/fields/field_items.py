@@ -201,6 +201,11 @@ def box_in_frame(shape: Shape, X_WC: np.ndarray, X_WS: np.ndarray) -> BoxAround:
     return BoxAround(low - slack, high + slack, stretch)
 
 
+def turned_back(R: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Rᵀ v of vectors (…, 3): products added up in order, each rounded once, as C does."""
+    return vectors[..., :1] * R[0] + vectors[..., 1:2] * R[1] + vectors[..., 2:] * R[2]
+
+
 def items_on_way(
     items: FieldItems, X_WF: np.ndarray, origin: np.ndarray, vector: np.ndarray, limit: float, extra: float,
     *, first: bool = False,
@@ -208,7 +213,7 @@ def items_on_way(
     """`FieldItems.on_way` from an origin along a vector of the world."""
     X_WG = items.pose(X_WF)
     R, t = X_WG[:3, :3], X_WG[:3, 3]
-    way = np.concatenate([(origin - t) @ R, vector @ R])
+    way = np.concatenate([turned_back(R, origin - t), turned_back(R, vector)])
     return items.on_way(way, limit, extra, rounding_of_places(items, X_WG[None], origin[None], extra), first)
 
 
