@@ -342,7 +342,7 @@ def _pair_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--ignore", action="append", default=[], metavar="A,B",
                         help="do not test this pair of bodies; may be given again, and the report says so")
     parser.add_argument("--depth", choices=("quick", "least"), default="quick",
-                        help="least: search the shortest way out of overlapping meshes and unions, some 0.5 s a pair "
+                        help="least: search the shortest way out of overlapping bodies, some 0.5 s a pair with meshes "
                              "(quick: a way out)")
 
 

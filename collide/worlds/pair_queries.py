@@ -78,8 +78,8 @@ class WorldPairs(WorldScene):
         Parameters
         ----------
         threads : at most so many answer; the answers are the same bits.
-        depth : "least" to search the shortest translation of overlapping unions and solids, as of `collide.distance`:
-            one pair after another, 30 ms to 2 s each.
+        depth : "least" to search the shortest translation of overlapping bodies, convex or not, as of
+            `collide.distance`: one pair after another, 30 ms to 2 s each.
 
         Returns
         -------
