@@ -27,7 +27,7 @@ from collide.shapes.shape import Shape, kept_with_shape
 #: how much of a ball is to stand out of the others; vertices kept as balls of radius 0.
 _GRID, _FACETS, _BENEATH, _MAX_BALLS, _OUT, _VERTICES = 20, 700, (0.003, 0.01, 0.03, 0.08), 800, 0.04, 200
 #: The smallest cubes, as a part of the shortest translation known; cubes looked at in all, and at once.
-_SMALLEST, _CUBES, _AT_ONCE = 2.0**-7, 60_000, 512
+_SMALLEST, _CUBES, _AT_ONCE = 2.0**-8, 120_000, 512
 
 _NO_BALLS = np.zeros((0, 4))
 
