@@ -106,6 +106,7 @@ if TYPE_CHECKING:
     from collide.transforms import pose
     from collide.worlds.hits import WorldHits
     from collide.worlds.world import World
+    from collide.worlds.world_batch import WorldBatch, WorldBatchResult
 
 __version__ = "0.1.0"
 
@@ -172,6 +173,7 @@ _HOMES = {
     "collide.papers.tetrahedra.tet_mesh": ("TetMesh",),
     "collide.transforms": ("pose",),
     "collide.worlds.world": ("World",),
+    "collide.worlds.world_batch": ("WorldBatch", "WorldBatchResult"),
     "collide.worlds.hits": ("WorldHits",),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
@@ -193,10 +195,10 @@ __all__ = [
     "RepairedMesh", "Robot", "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions", "Shape",
     "ShapeCasts", "ShapeSet", "SignedDistanceGrid", "SignedDistances", "SpacePartition", "Sphere", "Spline",
     "SweepResults", "SweptMesh", "TetMesh", "TimeOfImpact", "Uniqueness", "UnknownBody", "UnsupportedQuery",
-    "VoxelGrid", "World", "WorldHits", "WorldResult", "audit_pieces", "boolean", "certify", "collide", "combine",
-    "configuration_obstacle", "contacts", "contains", "distance", "enclosing_spheres", "facet_pairs", "get_include",
-    "get_library", "moved_poses", "overlap_volume", "overlapping_cells", "overlay", "plan", "pose", "poses",
-    "poses_in_motion", "propose_disabled_pairs", "raycast", "read_sweep", "repaired", "self_collisions",
+    "VoxelGrid", "World", "WorldBatch", "WorldBatchResult", "WorldHits", "WorldResult", "audit_pieces", "boolean",
+    "certify", "collide", "combine", "configuration_obstacle", "contacts", "contains", "distance", "enclosing_spheres", "facet_pairs",
+    "get_include", "get_library", "moved_poses", "overlap_volume", "overlapping_cells", "overlay", "plan", "pose",
+    "poses", "poses_in_motion", "propose_disabled_pairs", "raycast", "read_sweep", "repaired", "self_collisions",
     "self_overlapping_cells", "shape_cast", "signed_distances", "sweep", "tessellate", "time_of_impact", "to_library",
     "verify", "walk",
 ]

@@ -57,7 +57,7 @@ def _meet(boxes, at, box):
 
 
 @kernel(inline=True)
-def _are_tested(tree, i, j, either):
+def are_tested(tree, i, j, either):
     """Whether filters let a pair through.   either : bits of FLAGS that the two must not share."""
     a, b = TRAITS * i, TRAITS * j
     traits = tree.traits
@@ -72,7 +72,7 @@ def _are_tested(tree, i, j, either):
 
 
 @kernel(inline=True)
-def _are_near(boxes, i, j, margin):
+def are_near(boxes, i, j, margin):
     """Whether two bodies' boxes come within a margin, i < j. All six are compared: a branch that is foreseen half of
     the time costs more.
     """
@@ -91,7 +91,7 @@ def _lowered(x, margin):
 
 
 @kernel(inline=True)
-def _raised(x, margin):
+def raised(x, margin):
     return x + (margin + (abs(x) + margin) * _ROUNDING) if margin > 0.0 else x
 
 
@@ -100,7 +100,7 @@ def _box_at(boxes, at, margin):
     """A box and a margin around it, and what rounding may do."""
     return _Box(
         _lowered(boxes[at], margin), _lowered(boxes[at + 1], margin), _lowered(boxes[at + 2], margin),
-        _raised(boxes[at + 3], margin), _raised(boxes[at + 4], margin), _raised(boxes[at + 5], margin),
+        raised(boxes[at + 3], margin), raised(boxes[at + 4], margin), raised(boxes[at + 5], margin),
     )
 
 
@@ -139,8 +139,8 @@ def _pairs_below(tree, stack, top, reach, margin, of_leaves, keys, count):
         if end_a - a == 1 and end_b - b == 1:
             i, j = links[LINK * a + BODY], links[LINK * b + BODY]
             i, j = min(i, j), max(i, j)
-            is_pair = i >= 0 and (of_leaves or _are_near(tree.boxes, i, j, margin))
-            if is_pair and _are_tested(tree, i, j, either):
+            is_pair = i >= 0 and (of_leaves or are_near(tree.boxes, i, j, margin))
+            if is_pair and are_tested(tree, i, j, either):
                 count = _note_pair(keys, count, i, j)
             continue
         if end_a - a < end_b - b:
@@ -246,7 +246,7 @@ def pairs_among(tree_at, begin, end, margin, keys_at, capacity):
         node = _next_leaf(tree, k + 1, tree.n_nodes, box)
         while node < tree.n_nodes:
             j = tree.links[LINK * node + BODY]
-            if _are_near(tree.boxes, min(i, j), max(i, j), margin) and _are_tested(tree, i, j, STILL_BIT):
+            if are_near(tree.boxes, min(i, j), max(i, j), margin) and are_tested(tree, i, j, STILL_BIT):
                 count = _note_pair(keys, count, i, j)
             node = _next_leaf(tree, node + 1, tree.n_nodes, box)
     return count
@@ -271,7 +271,7 @@ def first_pairs(tree_at, n_bodies, keys_at, capacity):
             node = _next_leaf(tree, 0, tree.n_nodes, box)
         while node < tree.n_nodes:
             j = tree.links[LINK * node + BODY]
-            if j > i and _meet(tree.boxes, 6 * j, box) and _are_tested(tree, i, j, STILL_BIT):
+            if j > i and _meet(tree.boxes, 6 * j, box) and are_tested(tree, i, j, STILL_BIT):
                 count = _insert_key(keys, begin, count, (i << 32) + j)
             node = _next_leaf(tree, node + 1, tree.n_nodes, box)
         i += 1
@@ -318,7 +318,7 @@ def mended_pairs(tree_at, cached_at, n_cached, margin, keys_at, capacity):
         while node < tree.n_nodes:
             j = tree.links[LINK * node + BODY]
             has_changed = (tree.traits[TRAITS * j + FLAGS] & CHANGED_BIT) != 0
-            if j != i and not (has_changed and node < leaf) and _are_tested(tree, i, j, STATIC_BIT):
+            if j != i and not (has_changed and node < leaf) and are_tested(tree, i, j, STATIC_BIT):
                 count = _note_pair(keys, count, i, j)
             node = _next_leaf(tree, node + 1, tree.n_nodes, box)
     return count
@@ -370,9 +370,9 @@ def tested_pairs(tree_at, keys_at, n, margin, are_filtered, pairs_at):
         pairs[2 * count] = i
         pairs[2 * count + 1] = j
         is_awake = (tree.traits[TRAITS * i + FLAGS] & tree.traits[TRAITS * j + FLAGS] & STILL_BIT) == 0
-        is_pair = is_awake & _are_near(tree.boxes, i, j, margin)
+        is_pair = is_awake & are_near(tree.boxes, i, j, margin)
         if not are_filtered:
-            is_pair = is_pair and _are_tested(tree, i, j, STILL_BIT)
+            is_pair = is_pair and are_tested(tree, i, j, STILL_BIT)
         count += 1 if is_pair else 0
     return count
 

@@ -81,10 +81,11 @@ def _in_python(function: Any, prepare: Callable, result: Any, certify: Callable 
 
 
 def _are_plain(
-    arguments: tuple, *, check_poses=True, threads=1, axes=None, algorithm=None, depth="quick", like=None, **_
+    arguments: tuple, *, check_poses=True, threads=1, axes=None, algorithm=None, depth="quick", derivatives=False,
+    like=None, **_,
 ) -> bool:
     plain = check_poses.__class__ is bool and threads.__class__ is int and threads == 1
-    plain = plain and isinstance(depth, str) and depth == "quick"
+    plain = plain and isinstance(depth, str) and depth == "quick" and derivatives is False
     return len(arguments) == 4 and plain and axes is None and algorithm is None and like is None
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from collide.broadphase.bounding_boxes import least_distances
 from collide.worlds.packed_world import PackedWorld
+from collide.worlds.posed_bodies import PosedBodies
 
 #: Relative: what a bound from boxes, or a distance within its bracket, may be off. Far more than either is.
 _ROUNDING = 2.0**-24
@@ -65,7 +66,7 @@ def _margins(packed: PackedWorld, limit: float):
 
 def _least(packed: PackedWorld, pairs: np.ndarray, limit: float, best: float, winner: _Nearest, threads: int):
     """(least distance, its pair) among pairs (k, 2) and the best so far."""
-    bounds, size = _lower_bounds(packed, pairs), _FIRST
+    bounds, size = lower_bounds(packed, pairs), _FIRST
     while True:
         top = best + _ROUNDING * abs(best) if best > -np.inf else best  # −inf: two half-spaces
         remain = bounds <= min(top, limit)
@@ -79,13 +80,15 @@ def _least(packed: PackedWorld, pairs: np.ndarray, limit: float, best: float, wi
         for row in rows[np.lexsort((rows["b"], rows["a"], rows["distance"]))][:1, None]:
             pair, distance = np.array([[row["a"][0], row["b"][0]]], dtype=np.int64), float(row["distance"][0])
             if distance < best or (distance == best and tuple(pair[0]) < tuple(winner.pair[0])):
-                # Depths have no limit: a row that hits is that of any, a gap's may be of a search that the limit cut.
-                best, winner = distance, _Nearest(pair, row if reach == np.inf or row["hit"][0] else None)
+                # Depths have no limit: a row of convex bodies that hit is that of any. A gap's may be of a search that
+                # the limit cut, and a union's iterations are those of the parts within the limit.
+                is_any = row["hit"][0] and packed.parts.single_convex[pair[0]].all()
+                best, winner = distance, _Nearest(pair, row if reach == np.inf or is_any else None)
         bounds[nearest] = np.inf
         pairs, bounds, size = pairs[bounds < np.inf], bounds[bounds < np.inf], 2 * size
 
 
-def _lower_bounds(packed: PackedWorld, pairs: np.ndarray) -> np.ndarray:
+def lower_bounds(packed: PosedBodies, pairs: np.ndarray) -> np.ndarray:
     """(k,) lower bounds of signed distances [m], as of `gap_bounds`: less than the gap of boxes, or minus the shortest
     shift along an axis to part them. With a body not convex, whose depth is known from above alone, −inf where they
     may meet.

@@ -17,7 +17,8 @@ from collide.narrowphase.convex_kernel_calls import run_pairs
 from collide.narrowphase.dispatch_functions import rows_of_pair
 from collide.results import PAIR_DTYPE
 from collide.shapes.shape import Shape
-from collide.worlds.packed_world import PackedWorld, batches_of_shapes
+from collide.worlds.packed_world import PackedWorld
+from collide.worlds.posed_bodies import batches_of_shapes
 from collide.worlds.world_parts import MIN_BY_TREE, runs
 
 #: Half of the engine, which scenes without meshes never load.

@@ -19,7 +19,8 @@ from collide.pairs.least_depths import DepthSearch, checked_depth, shorten_depth
 from collide.pairs.security_margin import checked_margin, within
 from collide.results import PAIR_DTYPE, WorldResult
 from collide.worlds.minimum import nearest_pair
-from collide.worlds.packed_world import Answer, PackedWorld, joined
+from collide.worlds.packed_world import PackedWorld
+from collide.worlds.posed_bodies import Answer, PosedBodies, joined
 from collide.worlds.record import QueryRecord
 from collide.worlds.scene import WorldScene
 
@@ -255,11 +256,11 @@ class WorldPairs(WorldScene):
         culled = time.perf_counter()
         rest = _without(candidates, first) if answers else candidates
         wanted: list[np.ndarray] = []
-        for some, reach in _by_margin(packed, rest, limit) if margins else [(slice(None), limit)]:
+        for some, reach in by_margin(packed, rest, limit) if margins else [(slice(None), limit)]:
             is_boolean = boolean and not reach
             answer = packed.answer(rest[some], reach, boolean=is_boolean, stop_at_hit=is_boolean, threads=threads)
             answers.append(answer)
-            wanted.append(_wanted(packed, answer.rows, reach, boolean, margins))
+            wanted.append(wanted_rows(packed, answer.rows, reach, boolean, margins))
             if boolean and np.count_nonzero(wanted[-1]):
                 break
         answer = answers[0] if len(answers) == 1 else joined(answers, boolean=True)
@@ -291,7 +292,7 @@ def _contacts(packed: PackedWorld, margin: float, max_contacts: int, threads: in
         return WorldContacts(no_rows(), packed.bodies_named(pairs))
     counts = np.zeros(len(pairs), dtype=np.int64)
     of_groups = []
-    for some, limit in _by_margin(packed, pairs, margin):
+    for some, limit in by_margin(packed, pairs, margin):
         rows, counts[some] = world_contacts.contacts_in_pieces(packed, pairs[some], limit, max_contacts, threads)
         of_groups.append(rows)
     rows = of_groups[0] if len(of_groups) == 1 else _sorted_by_pair(np.concatenate(of_groups), CONTACT_DTYPE)
@@ -311,7 +312,7 @@ def _without(pairs: np.ndarray, some: np.ndarray) -> np.ndarray:
     return np.delete(pairs, np.searchsorted(keys, keys_of_some), axis=0)
 
 
-def _by_margin(packed: PackedWorld, pairs: np.ndarray, margin: float) -> Iterator[tuple[np.ndarray | slice, float]]:
+def by_margin(packed: PosedBodies, pairs: np.ndarray, margin: float) -> Iterator[tuple[np.ndarray | slice, float]]:
     """(rows of pairs with the same margin, this margin plus the margin given [m]); at least a single group."""
     if not packed.has_margins:
         yield slice(None), margin
@@ -323,18 +324,18 @@ def _by_margin(packed: PackedWorld, pairs: np.ndarray, margin: float) -> Iterato
         yield np.flatnonzero(which.reshape(-1) == k), limit
 
 
-def _wanted(packed: PackedWorld, rows: np.ndarray, limit: float, boolean: bool, margins: bool) -> np.ndarray:
+def wanted_rows(packed: PosedBodies, rows: np.ndarray, limit: float, boolean: bool, margins: bool) -> np.ndarray:
     """The rows wanted by a question, or for booleans whether each row is a hit."""
     if not margins:
         not_farther = ~(rows["lower"] > limit)  # not proven to be, also where the bracket holds the limit
         return _picked(rows, not_farther)
     if not limit:
         return rows["hit"].copy() if boolean else _picked(rows, rows["hit"])
-    shapes, X_WBs = packed.roster.shapes, packed.X_WBs
+    shapes, shape_of, X_WBs = packed.shapes, packed.shape_of, packed.X_WBs
 
     def question(k: int):
         a, b = int(rows["a"][k]), int(rows["b"][k])
-        return shapes[a], shapes[b], X_WBs[a], X_WBs[b]
+        return shapes[shape_of[a]], shapes[shape_of[b]], X_WBs[a], X_WBs[b]
 
     near = within(rows, limit, question)
     return near if boolean else _picked(rows, near)

@@ -8,7 +8,7 @@ import pytest
 
 import collide
 from collide import Box, Compound, Halfspace, InvalidArgument, Sphere, World, pose
-from collide.worlds import outside, packed_world
+from collide.worlds import outside, posed_bodies
 from collide.worlds.bodies import WorldBodies
 from collide.worlds.world_parts import MIN_BY_TREE
 
@@ -153,7 +153,7 @@ def test_pieces_behind_the_first_hit_are_left_out_in_any_order(monkeypatch):
             world.add(Box((1, 1, 1)), pose((10 * k + shift, 0, 0)))
     packed = world._pack()
     pairs = np.arange(16).reshape(8, 2)
-    monkeypatch.setattr(packed_world, "_PAIRS_AT_ONCE", 2)
+    monkeypatch.setattr(posed_bodies, "_PAIRS_AT_ONCE", 2)
     shares = []
 
     def backwards(starts, work, threads):
@@ -161,8 +161,8 @@ def test_pieces_behind_the_first_hit_are_left_out_in_any_order(monkeypatch):
         for start in reversed(starts):
             work(start)
 
-    for share in (packed_world.share, backwards):
-        monkeypatch.setattr(packed_world, "share", share)
+    for share in (posed_bodies.share, backwards):
+        monkeypatch.setattr(posed_bodies, "share", share)
         for threads in (1, 2):
             found = packed.answer(pairs, 0.0, boolean=True, stop_at_hit=True, threads=threads)
             assert found.rows["hit"].tolist() == [False] * 4 + [True] and found.body_pairs == 5
@@ -179,7 +179,7 @@ def test_of_many_candidates_the_likeliest_are_asked_first(monkeypatch, most, fir
         for shift in (0.0, 0.5 if k == 39 else 1.0 + 2.0**-20):
             world.add(Box((1, 1, 1)), pose((10 * k + shift, 0, 0)))
     packed = world._pack()
-    monkeypatch.setattr(packed_world, "_MIN_SORTED", most)
+    monkeypatch.setattr(posed_bodies, "_MIN_SORTED", most)
     pairs = np.arange(80).reshape(40, 2)
     sorted_first = []
     real = packed._likeliest
@@ -393,7 +393,7 @@ def test_rows_of_many_pieces_are_those_of_one(monkeypatch, threads):
         assert whole[["a", "b"]].tolist() == [(a, b) for a in range(9) for b in range(a + 1, 9)]
         for size in (4, 18, 36):
             with monkeypatch.context() as patch:
-                patch.setattr(packed_world, "_PAIRS_AT_ONCE", size)
+                patch.setattr(posed_bodies, "_PAIRS_AT_ONCE", size)
                 assert world.distances(threads=threads).rows.tobytes() == whole.tobytes()
                 assert world.stats["narrowphase"] == 36
                 assert world.collides(threads=threads) == bool(whole["hit"].any())

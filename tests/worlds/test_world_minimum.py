@@ -9,7 +9,7 @@ import pytest
 from naive import pose, random_pose, rng_of
 
 import collide
-from collide.worlds.minimum import _lower_bounds
+from collide.worlds.minimum import lower_bounds
 from collide.worlds.packed_world import PackedWorld
 
 BOX = collide.Box((1.0, 1.0, 1.0))
@@ -109,7 +109,7 @@ def test_bounds_are_below_every_distance():
     world.add(collide.Mesh(mesh.vertices, mesh.faces[:-2]), pose(t=(0.25, 0, 0)))
     world.add(collide.Halfspace((0, 0, 1.0), -9.0))
     pairs = np.array([(0, 1), (1, 2), (0, 3), (0, 4), (1, 4), (0, 5)])
-    bounds = _lower_bounds(world._pack(), pairs)
+    bounds = lower_bounds(world._pack(), pairs)
     expected = [2.0, np.hypot(0.5, 4.0), -0.75, -np.inf, 1.75, -np.inf]
     for bound, value in zip(bounds.tolist(), expected):
         assert bound == value if np.isinf(value) else value - 1e-6 <= bound < value, bounds
