@@ -14,7 +14,7 @@ import numpy as np
 
 from collide.derivatives.active_parts import active_pairs, is_least_of_parts
 from collide.derivatives.derived_rows import Derived
-from collide.derivatives.differentiate import Ask, push_lengths
+from collide.derivatives.differentiate import LEAST_PUSH, PUSHED, Ask
 from collide.derivatives.features import LEVEL
 from collide.derivatives.gradient_rows import GRADIENT, NO_DEPTH, STATE, TOO_FAR, UNCERTAIN, UNIQUE
 from collide.lowering.packed_convex import CONE, ELLIPSOID, HALFSPACE, POINTS, PackedConvex
@@ -41,9 +41,10 @@ def gradients_of_row(row: np.ndarray, question: tuple, derived: Derived, k: int,
     if state in (UNCERTAIN, TOO_FAR, NO_DEPTH):
         return np.empty((0, 12))
     if is_single_convex(A) and is_single_convex(B):
-        lengths = push_lengths(derived.numbers[k : k + 1], derived.radii[k : k + 1], X_WA[None], X_WB[None])
-        return distinct(_convex_corners(row, A, B, X_WA, X_WB, float(lengths[0]), ask))
-    active = active_pairs(A, B, X_WA, X_WB, float(row["upper"][0])) if is_least_of_parts(row[0], A, B) else None
+        return distinct(_convex_corners(row, A, B, X_WA, X_WB, ask))
+    if not is_least_of_parts(row[0], A, B):
+        return np.empty((0, 12))
+    active = active_pairs(A, B, X_WA, X_WB, float(row["upper"][0]), row["normal"][0])
     if active is None:
         return np.empty((0, 12))
     origins = X_WA[:3, 3], X_WB[:3, 3]
@@ -55,16 +56,15 @@ def gradients_of_row(row: np.ndarray, question: tuple, derived: Derived, k: int,
     )
 
 
-def _convex_corners(
-    row: np.ndarray, A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, push: float, ask: Ask
-) -> np.ndarray:
-    """(m, 12) corners of two convex sets.   push : by how much B is pushed [m]."""
+def _convex_corners(row: np.ndarray, A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, ask: Ask) -> np.ndarray:
+    """(m, 12) corners of two convex sets."""
     (a, _), (b, _) = parts_of(A)[0], parts_of(B)[0]
     gap, origins = float(row["distance"][0]), (X_WA[:3, 3], X_WB[:3, 3])
     size = a.reach + b.reach + a.radius + b.radius + abs(gap)
     directions = [row[0]]
     if gap + a.radius + b.radius <= LEVEL * size:
         pushes = np.concatenate([_PUSHES, *(sign * X[:3, :3].T for X in (X_WA, X_WB) for sign in (-1.0, 1.0))])
+        push = max(PUSHED * abs(gap + a.radius + b.radius), LEAST_PUSH * (size + np.abs(origins).sum()))
         pushes *= push
         X_pushed = np.repeat(X_WB[None], len(pushes), axis=0)
         X_pushed[:, :3, 3] += pushes

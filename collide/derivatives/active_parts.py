@@ -41,6 +41,13 @@ class Placed(NamedTuple):
     X_BP: np.ndarray
 
 
+class Way(NamedTuple):
+    """A direction n (3,) from a body towards B, and how far B reaches against n [m]."""
+
+    n: np.ndarray
+    reach_of_b: float
+
+
 class ActivePairs(NamedTuple):
     """Pairs of parts as near as the bodies.
 
@@ -54,12 +61,17 @@ class ActivePairs(NamedTuple):
     rows: np.ndarray
 
 
-def active_pairs(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, upper: float) -> ActivePairs | None:
+def active_pairs(
+    A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, upper: float, n: np.ndarray
+) -> ActivePairs | None:
     """The `ActivePairs` of bodies apart by at most ``upper`` [m], or of a half-space and a body, at poses (4, 4);
     ``None`` where bodies are not made of convex parts, or more pairs are near than `MAX_PAIRS`.
+
+    n : (3,) the normal. Facets that B's lowest point along n is farther from than ``upper`` are left out.
     """
     upper = max(upper, 0.0)
-    of_a, of_b = _parts_near(A, X_WA, B, X_WB, upper), _parts_near(B, X_WB, A, X_WA, upper)
+    ways = Way(n, _reach_along(B, X_WB, -n)), Way(-n, _reach_along(A, X_WA, n))
+    of_a, of_b = _parts_near(A, X_WA, B, X_WB, upper, ways[0]), _parts_near(B, X_WB, A, X_WA, upper, ways[1])
     if of_a is None or of_b is None:
         return None
     sides = of_a, of_b
@@ -90,16 +102,16 @@ def is_least_of_parts(row, A: Shape, B: Shape) -> bool:
     return not row["hit"] or isinstance(A, Halfspace) or isinstance(B, Halfspace)
 
 
-def _parts_near(shape: Shape, X_WS: np.ndarray, B: Shape, X_WB: np.ndarray, upper: float) -> Placed | None:
+def _parts_near(shape: Shape, X_WS: np.ndarray, B: Shape, X_WB: np.ndarray, upper: float, way: Way) -> Placed | None:
     """The convex parts of a shape that may be within a distance of B; ``None`` of regions and terrain."""
     if isinstance(shape, Compound):
-        return _items_near(shape, X_WS, B, X_WB, upper)
+        return _items_near(shape, X_WS, B, X_WB, upper, way)
     if shape.is_region or (shape.is_field and isinstance(shape, HeightField)):
         return None
     if isinstance(shape, Mesh):
-        return _facets_near(shape, 0.0, X_WS, B, X_WB, upper)
+        return _facets_near(shape, 0.0, X_WS, B, X_WB, upper, way)
     if isinstance(shape, SweptMesh):
-        return _facets_near(shape.mesh, shape.radius, X_WS, B, X_WB, upper)
+        return _facets_near(shape.mesh, shape.radius, X_WS, B, X_WB, upper, way)
     if shape.is_field:
         items = items_of(shape)
         hulls = items.hulls(items_within(items, B, X_WS, X_WB, upper * (1.0 + _SLACK)))
@@ -109,11 +121,11 @@ def _parts_near(shape: Shape, X_WS: np.ndarray, B: Shape, X_WB: np.ndarray, uppe
     return Placed([packed], X_SP[None])
 
 
-def _items_near(shape: Compound, X_WS: np.ndarray, B: Shape, X_WB: np.ndarray, upper: float) -> Placed | None:
+def _items_near(shape: Compound, X_WS: np.ndarray, B: Shape, X_WB: np.ndarray, upper: float, way: Way) -> Placed | None:
     sets: list[PackedConvex] = []
     poses: list[np.ndarray] = []
     for item, X_SI in shape.items:
-        parts = _parts_near(item, X_WS @ X_SI, B, X_WB, upper)
+        parts = _parts_near(item, X_WS @ X_SI, B, X_WB, upper, way)
         if parts is None:
             return None
         sets += parts.sets
@@ -121,8 +133,10 @@ def _items_near(shape: Compound, X_WS: np.ndarray, B: Shape, X_WB: np.ndarray, u
     return Placed(sets, np.concatenate(poses))
 
 
-def _facets_near(mesh: Mesh, radius: float, X_WM: np.ndarray, B: Shape, X_WB: np.ndarray, upper: float) -> Placed:
-    """Facets by their boxes beside the box around B; beside half-spaces by their heights. O(facets)."""
+def _facets_near(
+    mesh: Mesh, radius: float, X_WM: np.ndarray, B: Shape, X_WB: np.ndarray, upper: float, way: Way
+) -> Placed:
+    """Facets by their boxes beside the box around B, and along a way; by heights beside half-spaces. O(facets)."""
     corners = (mesh.vertices @ X_WM[:3, :3].T + X_WM[:3, 3])[mesh.faces]
     slack = _SLACK * (np.abs(corners).max() + np.abs(X_WB[:3, 3]).max() + upper)
     is_near = np.zeros(len(corners), dtype=bool)
@@ -135,9 +149,17 @@ def _facets_near(mesh: Mesh, radius: float, X_WM: np.ndarray, B: Shape, X_WB: np
         low, high = _boxes([packed], X[None])[0]
         gaps = np.maximum(corners.min(axis=1) - high, low - corners.max(axis=1))
         is_near |= np.linalg.norm(np.maximum(gaps, 0.0), axis=1) <= upper + radius + slack
+    if math.isfinite(way.reach_of_b):
+        # No point of B is lower along n than −reach: a facet lower than that by more than ``upper`` is farther.
+        is_near &= (corners @ way.n).max(axis=1) + radius >= -way.reach_of_b - upper - slack
     facets = np.flatnonzero(is_near)
     sets = [pack_points(mesh.vertices[mesh.faces[k]], radius) for k in facets.tolist()]
     return Placed(sets, np.broadcast_to(IDENTITY, (len(sets), 4, 4)))
+
+
+def _reach_along(shape: Shape, X_WS: np.ndarray, n: np.ndarray) -> float:
+    """How far a shape reaches along a unit vector, at most [m]; infinite with a half-space."""
+    return max(extent_of(packed, X_WS @ X_SP, n) for packed, X_SP in bounding_parts_of(shape))
 
 
 def _boxes(sets: list[PackedConvex], X: np.ndarray) -> np.ndarray:

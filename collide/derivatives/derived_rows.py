@@ -10,12 +10,13 @@ import numpy as np
 from collide.derivatives.gradient_rows import (
     DERIVATIVE,
     DERIVATIVE_INTS,
+    GRADIENT_DOUBLES,
     GRADIENT_HEADER,
     NOT_CONVEX,
     STATE,
     differentiate_rows,
 )
-from collide.derivatives.settle_features import SETTLE_DOUBLES, SETTLE_INTS
+from collide.derivatives.settle_features import SETTLE_INTS
 from collide.kernels import address_of
 from collide.lowering.lowered_sets import in_rows
 from collide.lowering.parts import parts_of
@@ -64,7 +65,7 @@ def run_rows(rows: np.ndarray, table: SetTable, sets: tuple, X_WP: tuple, X_WB: 
     sets : (n,) rows of the table, of A and of B.   X_WP, X_WB : poses (n, 4, 4) or (1, 4, 4) of the sets and of the
     bodies, of A and of B.
     """
-    work, ints, header = np.empty(SETTLE_DOUBLES), np.empty(SETTLE_INTS, np.int64), np.empty(GRADIENT_HEADER, np.int64)
+    work, (ints, header) = np.empty(GRADIENT_DOUBLES), (np.empty(k, np.int64) for k in (SETTLE_INTS, GRADIENT_HEADER))
     sets = tuple(np.ascontiguousarray(of, dtype=np.int64) for of in sets)
     X = [np.ascontiguousarray(X_W, dtype=np.float64) for X_W in (*X_WP, *X_WB)]
     rows = np.ascontiguousarray(rows)

@@ -36,7 +36,7 @@ from collide.shapes.shape import Shape
 
 #: By what part of the cores' depth B is pushed deeper to see whether another direction is as short, and by what part of
 #: the pair's size, places included, at least.
-PUSHED, _LEAST_PUSH = 2.0**-16, 2.0**-36
+PUSHED, LEAST_PUSH = 2.0**-16, 2.0**-36
 #: Directions and depths of the pushed pair that differ by less are the same.
 _SAME_DIRECTION, _SAME_DEPTH = 2.0**-10, 2.0**-10
 #: Gradients of parts as near that differ by less than this part of the largest number are the same.
@@ -55,11 +55,15 @@ def differentiate(rows: np.ndarray, question: tuple, ask: Ask) -> Derived:
     is_pair = is_convex[of_a] & is_convex[of_b]
     some = np.flatnonzero(is_pair)
     if len(some):
-        table, poses = table_of(shapes, is_convex), tuple(X if len(X) == 1 else X[some] for X in (X_WA, X_WB))
-        part = derived if len(some) == n else Derived(*(column[some] for column in derived))
-        run_rows(rows[some], table, (of_a[some], of_b[some]), poses, poses, part)
-        for whole, piece in zip(derived, part):
-            whole[some] = piece
+        table, poses = table_of(shapes, is_convex), (X_WA, X_WB)
+        if len(some) == n:
+            run_rows(rows, table, (of_a, of_b), poses, poses, derived)
+        else:
+            poses = tuple(X if len(X) == 1 else X[some] for X in poses)
+            part = Derived(*(column[some] for column in derived))
+            run_rows(rows[some], table, (of_a[some], of_b[some]), poses, poses, part)
+            for whole, piece in zip(derived, part):
+                whole[some] = piece
     for k in np.flatnonzero(~is_pair).tolist():
         X_WAk, X_WBk = (X[k if len(X) > 1 else 0] for X in (X_WA, X_WB))
         out = Derived(*(column[k] for column in derived))
@@ -81,7 +85,7 @@ def _differentiate_union(row, A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.nda
         if _is_ball(A) or _is_ball(B):
             _put_ball(row, A, B, X_WA, X_WB, out)
         return
-    active = active_pairs(A, B, X_WA, X_WB, float(row["upper"]))
+    active = active_pairs(A, B, X_WA, X_WB, float(row["upper"]), row["normal"])
     if active is None:
         return
     states, gradients = active.derived.kinds[:, STATE], active.derived.numbers[:, GRADIENT : GRADIENT + 12]
@@ -152,4 +156,4 @@ def push_lengths(numbers: np.ndarray, radii: np.ndarray, X_WA: np.ndarray, X_WB:
     size = radii.sum(axis=1)
     for at, X in ((CORE_A, X_WA), (CORE_B, X_WB)):
         size += np.abs(numbers[:, at : at + 3] - X[:, :3, 3]).sum(axis=1) + np.abs(X[:, :3, 3]).sum(axis=1)
-    return np.maximum(PUSHED * np.abs(numbers[:, CORE_DISTANCE]), _LEAST_PUSH * size)
+    return np.maximum(PUSHED * np.abs(numbers[:, CORE_DISTANCE]), LEAST_PUSH * size)

@@ -382,26 +382,32 @@ def _put_code(codes, at, n, code, i, j, k):
 
 
 @kernel
-def holds_place(body, code, ids, place, at, g):
-    """Whether a settled point of a feature is the set's support point along g: high enough, and within the feature."""
+def holds_place(body, code, ids, place, at, g, slack):
+    """Whether a settled point of a feature is the set's support point along g: high enough, and within the feature.
+
+    slack : by how much the point may be off the feature [m]. The normal of a gap d turns by slack / d where it is.
+    """
     if code == SMOOTH or body.kind == HALFSPACE:
         return True
     level = 4.0 * LEVEL * reach_of(body)
     is_side = code == CYLINDER_SIDE or code == CONE_SIDE
     if not is_side and dot(g, patch_at(body, code, place, at, g).p) < support_height(body, g) - level:
         return False
-    return _clearance(body, code, ids, place, at, g) >= -level
+    return _clearance(body, code, ids, place, at, g, -slack) >= -slack
 
 
 @kernel(inline=True)
 def is_inside(body, code, ids, place, at, g):
     """Whether a settled point lies inside its feature, off the border."""
-    return _clearance(body, code, ids, place, at, g) > 4.0 * LEVEL * reach_of(body) or body.kind == HALFSPACE
+    least = 4.0 * LEVEL * reach_of(body)
+    return body.kind == HALFSPACE or _clearance(body, code, ids, place, at, g, least) > least
 
 
 @kernel
-def _clearance(body, code, ids, place, at, g):
-    """How far a settled point of a feature is from the feature's border [m], less than 0 outside; of faces by sign."""
+def _clearance(body, code, ids, place, at, g, least):
+    """How far a settled point of a feature is from the feature's border [m], less than 0 outside; of faces of points
+    infinitely far, where by more than ``least``, or infinitely far outside.
+    """
     radius, half, along = body.numbers[PARAMS], body.numbers[PARAMS + 1], place[at + _ALONG]
     p = vec3_at(place, at + _POINT)
     if code == EDGE:
@@ -413,28 +419,29 @@ def _clearance(body, code, ids, place, at, g):
     if code == CONE_SIDE:
         return min(along, math.sqrt(radius * radius + 4.0 * half * half) - along)
     if code == FLAT and body.kind == POINTS:
-        return math.inf if _is_among(body, p, g, 4.0 * LEVEL * reach_of(body)) else -math.inf
+        return math.inf if _is_among(body, p, g, least) else -math.inf
     if code == FLAT:
         return radius - math.sqrt(p.x * p.x + p.y * p.y)
     return math.inf
 
 
 @kernel
-def _is_among(body, p, g, level):
-    """Whether a point lies among the highest vertices along g: a point outside sees all of them to a side of one."""
-    least = support_height(body, g) - level
+def _is_among(body, p, g, least):
+    """Whether a point lies among the highest vertices along g, off their outline by more than ``least`` [m]: a point
+    outside sees all of them to a side of one."""
+    lowest = support_height(body, g) - 4.0 * LEVEL * reach_of(body)
     for i in range(body.count):
         v = vertex_of(body, i)
         offset = sub(v, p)
-        if dot(g, v) < least:
+        if dot(g, v) < lowest:
             continue
-        if norm(offset) <= level:
-            return True
+        if not norm(offset) > 0.0:
+            return least <= 0.0
         to_side = cross(g, offset)
         has_right = False
         for j in range(body.count):
             w = vertex_of(body, j)
-            if dot(g, w) >= least and dot(to_side, sub(w, p)) < -level * norm(offset):
+            if dot(g, w) >= lowest and dot(to_side, sub(w, p)) < -least * norm(offset):
                 has_right = True
                 break
         if not has_right:

@@ -34,6 +34,7 @@ from collide.derivatives.settle_features import (
     posed_patch,
     settle_features,
 )
+from collide.derivatives.zonotope_directions import ZONOTOPE_DOUBLES, has_single_direction, is_zonotope
 from collide.kernels import entry, kernel, view_f64, view_i64
 from collide.lowering.packed_convex import HALFSPACE, POINTS
 from collide.narrowphase.rows import BEYOND, CERTIFIED, DISTANCE, LOWER, NORMAL, POINT_A, POINT_B, ROW, UPPER, view_row
@@ -66,7 +67,7 @@ _NEARLY_LEVEL = 2.0**-20
     ROWS_AT, INTS_AT, NUMBERS_AT, SETS_A_AT, SETS_B_AT, PARTS_A_AT, PART_STEP_A, PARTS_B_AT, PART_STEP_B, BODIES_A_AT,
     BODY_STEP_A, BODIES_B_AT, BODY_STEP_B, OUT_AT, OUT_INTS_AT, WORK_DOUBLES_AT, WORK_INTS_AT,
 ) = range(17)
-GRADIENT_HEADER = 17
+GRADIENT_HEADER, GRADIENT_DOUBLES = 17, SETTLE_DOUBLES + ZONOTOPE_DOUBLES
 
 
 @entry("void(int64, int64)")
@@ -74,7 +75,7 @@ def differentiate_rows(header_at, n):
     """Derivatives of n rows of `PAIR_DTYPE`: (n, DERIVATIVE) and (n, DERIVATIVE_INTS) are written. O(vertices) each."""
     words = view_i64(header_at, GRADIENT_HEADER)
     sets_a, sets_b = view_i64(words[SETS_A_AT], n), view_i64(words[SETS_B_AT], n)
-    doubles, ints = view_f64(words[WORK_DOUBLES_AT], SETTLE_DOUBLES), view_i64(words[WORK_INTS_AT], SETTLE_INTS)
+    doubles, ints = view_f64(words[WORK_DOUBLES_AT], GRADIENT_DOUBLES), view_i64(words[WORK_INTS_AT], SETTLE_INTS)
     for k in range(n):
         row = view_row(words[ROWS_AT] + ROW * k)
         out = view_f64(words[OUT_AT] + 8 * DERIVATIVE * k, DERIVATIVE)
@@ -194,6 +195,10 @@ def _written(A, B, doubles, out, kinds, code_a, code_b, dimension_a, dimension_b
         return SEVERAL_POINTS
     if A.kind == HALFSPACE or B.kind == HALFSPACE or d > LEVEL * max(reach_of(A), reach_of(B)):
         return UNIQUE
+    if is_zonotope(A) and is_zonotope(B):
+        answer = has_single_direction(A, B, doubles, POSE_A, POSE_B, SETTLE_DOUBLES, n, d)
+        if answer >= 0:
+            return UNIQUE if answer > 0 else SEVERAL_DIRECTIONS
     return DIRECTION_OPEN
 
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from collide.derivatives.features import (
+    LEVEL,
     MAX_FEATURES,
     PLACE,
     Patch,
@@ -89,21 +90,25 @@ def settle_features(A, B, doubles, ints, n, p_a, p_b, d):
     at_a, at_b = into_frame(doubles, POSE_A, p_a), into_frame(doubles, POSE_B, p_b)
     n_a = list_features(A, g_a, at_a, _NEAR, ints, 0)
     n_b = list_features(B, g_b, at_b, _NEAR, ints, _FEATURES_B)
-    for i in range(0, 4 * n_a, 4):
-        for j in range(_FEATURES_B, _FEATURES_B + 4 * n_b, 4):
-            ids_a, ids_b = _ids_at(ints, i), _ids_at(ints, j)
-            put_feature(A, ints[i], ids_a, at_a, doubles, PLACE_A)
-            put_feature(B, ints[j], ids_b, at_b, doubles, PLACE_B)
-            settled = _solved(A, B, doubles, ints[i], ints[j], ids_a, ids_b, n, d)
-            if settled.is_answer and dot(settled.n, n) > 1.0 - _NEAR:
-                return settled
+    for slack in (0.0, 4.0 * LEVEL):  # of features whose border is met, the first that strictly holds the point
+        for i in range(0, 4 * n_a, 4):
+            for j in range(_FEATURES_B, _FEATURES_B + 4 * n_b, 4):
+                ids_a, ids_b = _ids_at(ints, i), _ids_at(ints, j)
+                put_feature(A, ints[i], ids_a, at_a, doubles, PLACE_A)
+                put_feature(B, ints[j], ids_b, at_b, doubles, PLACE_B)
+                settled = _solved(A, B, doubles, ints[i], ints[j], ids_a, ids_b, n, d, slack)
+                if settled.is_answer and dot(settled.n, n) > 1.0 - _NEAR:
+                    return settled
     nothing = SupportSet(0, ints[0], ints[0], ints[0])
     return Settled(False, ints[0], ints[0], nothing, nothing, n, d)
 
 
 @kernel
-def _solved(A, B, doubles, code_a, code_b, ids_a, ids_b, n, d):
-    """Newton's method for two features; is_settled where it settles at a point of both, and both are support points."""
+def _solved(A, B, doubles, code_a, code_b, ids_a, ids_b, n, d, slack):
+    """Newton's method for two features; an answer where both points settle within their features, as support points.
+
+    slack : as of `holds_place`, of each reach.
+    """
     size = max(reach_of(A), reach_of(B), abs(d))
     is_settled = False
     for _ in range(_STEPS):
@@ -128,9 +133,9 @@ def _solved(A, B, doubles, code_a, code_b, ids_a, ids_b, n, d):
             is_settled = True
             break
     if is_settled:
-        is_settled = holds_place(A, code_a, ids_a, doubles, PLACE_A, rotate_back(doubles, POSE_A, n)) and holds_place(
-            B, code_b, ids_b, doubles, PLACE_B, rotate_back(doubles, POSE_B, outward(n, -1.0))
-        )
+        g_a, g_b = rotate_back(doubles, POSE_A, n), rotate_back(doubles, POSE_B, outward(n, -1.0))
+        is_settled = holds_place(A, code_a, ids_a, doubles, PLACE_A, g_a, slack * reach_of(A))
+        is_settled = is_settled and holds_place(B, code_b, ids_b, doubles, PLACE_B, g_b, slack * reach_of(B))
     return Settled(is_settled, code_a, code_b, ids_a, ids_b, n, d)
 
 
