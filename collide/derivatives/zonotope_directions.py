@@ -1,7 +1,7 @@
-"""Whether the least depth of two points, segments or boxes has a single direction: all directions, one by one.
+"""Whether the least depth of two points, segments or boxes has a single direction, by trying all directions.
 
-A ⊖ B of such cores is a zonotope, a sum of segments; its facets are spanned by two of the segments each. So the
-directions in question are the cross products of pairs, both ways: the separating axes of two boxes.
+A ⊖ B of these cores is a zonotope, a sum of segments; each facet is spanned by two segments. So the directions are the
+cross products of pairs of segments, both ways: the separating axes of two boxes.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def has_single_direction(A, B, doubles, pose_a, pose_b, at, n, d):
     centre = sub(_centre(B, doubles, pose_b), _centre(A, doubles, pose_a))
     size = norm1(centre) + reach_of(A) + reach_of(B)
     least = max(TIED * -d, LEVEL * size)
-    is_told = False
+    has_facets = False
     for i in range(count):
         for j in range(i + 1, count):
             u, v = vec3_at(doubles, at + 3 * i), vec3_at(doubles, at + 3 * j)
@@ -48,7 +48,7 @@ def has_single_direction(A, B, doubles, pose_a, pose_b, at, n, d):
             length = norm(m)
             if length * length <= _PARALLEL * dot(u, u) * dot(v, v):
                 continue
-            is_told = True
+            has_facets = True
             m = scale(1.0 / length, m)
             width = 0.0
             for k in range(count):
@@ -56,7 +56,7 @@ def has_single_direction(A, B, doubles, pose_a, pose_b, at, n, d):
             height = dot(m, centre)
             if _is_tied(n, m, height - width, d, least) or _is_tied(n, neg(m), -height - width, d, least):
                 return 0
-    return 1 if is_told else -1
+    return 1 if has_facets else -1
 
 
 @kernel(inline=True)

@@ -250,7 +250,7 @@ def distance(
         As of `collide`: fields are arrays of the library, as by `PairResult.to`.
     derivatives : bool
         Whether the answer has derivatives by both poses as well (docs/derivatives.md). The rows are the same. Overlaps
-        of convex cores are asked twice.
+        of hulls and curved shapes are asked twice.
 
     Returns
     -------

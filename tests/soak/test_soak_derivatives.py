@@ -22,7 +22,7 @@ def test_derivatives_of_all_families_are_right():
 def test_a_wrong_derivative_is_noticed():
     family, A, B, X_WA, X_WB = soak_derivatives.pair_of(6, 0)
     r = collide.distance(A, B, X_WA, X_WB, derivatives=True)
-    rng = lambda: np.random.default_rng(1)  # noqa: E731
+    rng = lambda: np.random.default_rng(1)
     what, off = soak_derivatives.judge(rng(), A, B, X_WA, X_WB, r)
     assert family == "random" and r.unique and what == "slope" and off <= soak_derivatives.ENOUGH
     r._derived.numbers[0, 2] += 1e-4
