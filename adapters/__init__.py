@@ -2,6 +2,7 @@
 
 `collide.adapters.peers` asks other engines the same questions and compares the answers;
 `collide.adapters.hosts` lets programs written for another engine run on collide;
+`collide.adapters.arrays` has distances with gradients for PyTorch and JAX;
 `collide.adapters.planning` gives planners of others our checks and proofs;
 `collide.adapters.view(world)` shows a World in a browser, and follows it.
 """
@@ -20,7 +21,7 @@ _HOME = dict.fromkeys(__all__, "collide.adapters.live.world_viewer")
 
 
 #: Modules that are reached by name alone: ``collide.adapters.hosts.mujoco``.
-_MODULES = ("fuzzing", "hosts", "live", "peers", "planning")
+_MODULES = ("arrays", "fuzzing", "hosts", "live", "peers", "planning")
 
 
 def __getattr__(name: str):
