@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from collide.contact.contact_query import contacts
     from collide.contact.contact_rows import Contacts
     from collide.derivatives.pair_derivatives import PairDerivatives
+    from collide.derivatives.soft_minimum import SoftMinimum, soft_minimum
     from collide.derivatives.uniqueness import Uniqueness
     from collide.errors import (
         CollideError,
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
     from collide.motion.impact_query import moved_poses, poses_in_motion, time_of_impact
     from collide.motion.impact_rows import TimeOfImpact
     from collide.pairs.query import collide, distance
+    from collide.pairs.smoothed_distances import SmoothedDistances, smoothed_distances
     from collide.papers.hierarchies.hierarchy_queries import walk
     from collide.papers.partitions.cell_records import CellPlanes, ConvexCells
     from collide.papers.partitions.convex_parts import ConvexParts
@@ -141,8 +143,10 @@ _HOMES = {
     "collide.papers.partitions.portals": ("Portals",),
     "collide.papers.partitions.space_partition": ("Located", "PartitionSize", "SpacePartition"),
     "collide.derivatives.pair_derivatives": ("PairDerivatives",),
+    "collide.derivatives.soft_minimum": ("SoftMinimum", "soft_minimum"),
     "collide.derivatives.uniqueness": ("Uniqueness",),
     "collide.pairs.query": ("collide", "distance"),
+    "collide.pairs.smoothed_distances": ("SmoothedDistances", "smoothed_distances"),
     "collide.pose_arrays": ("poses",),
     "collide.results": ("How", "PairResult", "WorldResult"),
     "collide.robots.certified_boxes": ("CertifiedBoxes",),
@@ -186,22 +190,21 @@ _RENAMED = {
 
 __all__ = [
     "BooleanResult", "Box", "Capsule", "CellOverlaps", "CellPlanes", "Certificate", "CertificateRefused",
-    "CertifiedBoxes", "CertifiedEdges", "CertifiedMotion", "CollideError", "Compound", "Cone",
-    "ConfigurationObstacle", "Contacts", "ConvexCells", "ConvexHull", "ConvexParts", "ConvexPolygon", "Cylinder",
-    "DrawnConfigurations", "Ellipsoid", "EnclosingSpheres", "FacetPairs", "GridDistances", "HPolytope", "Halfspace",
-    "HeightField", "How", "InvalidArgument", "InvalidPose", "InvalidShape", "LinkPair", "Located", "Mesh",
-    "MissingExtra", "MotionPlan", "OcTree", "OcTreeLeaves", "OverlapVolume", "Overlay", "PairDerivatives", "PairResult",
-    "PartitionSize", "PieceAudit", "PlanarObstacle", "Plane", "PointCloud", "Portals", "Proposal", "RayHits",
-    "RepairedMesh", "Robot", "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions", "Shape",
-    "ShapeCasts", "ShapeSet", "SignedDistanceGrid", "SignedDistances", "SpacePartition", "Sphere", "Spline",
+    "CertifiedBoxes", "CertifiedEdges", "CertifiedMotion", "CollideError", "Compound", "Cone", "ConfigurationObstacle",
+    "Contacts", "ConvexCells", "ConvexHull", "ConvexParts", "ConvexPolygon", "Cylinder", "DrawnConfigurations",
+    "Ellipsoid", "EnclosingSpheres", "FacetPairs", "GridDistances", "HPolytope", "Halfspace", "HeightField", "How",
+    "InvalidArgument", "InvalidPose", "InvalidShape", "LinkPair", "Located", "Mesh", "MissingExtra", "MotionPlan",
+    "OcTree", "OcTreeLeaves", "OverlapVolume", "Overlay", "PairDerivatives", "PairResult", "PartitionSize",
+    "PieceAudit", "PlanarObstacle", "Plane", "PointCloud", "Portals", "Proposal", "RayHits", "RepairedMesh", "Robot",
+    "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet",
+    "SignedDistanceGrid", "SignedDistances", "SmoothedDistances", "SoftMinimum", "SpacePartition", "Sphere", "Spline",
     "SweepResults", "SweptMesh", "TetMesh", "TimeOfImpact", "Uniqueness", "UnknownBody", "UnsupportedQuery",
     "VoxelGrid", "World", "WorldBatch", "WorldBatchResult", "WorldHits", "WorldResult", "audit_pieces", "boolean",
-    "certify", "collide", "combine", "configuration_obstacle", "contacts", "contains", "distance",
-    "enclosing_spheres", "facet_pairs",
-    "get_include", "get_library", "moved_poses", "overlap_volume", "overlapping_cells", "overlay", "plan", "pose",
-    "poses", "poses_in_motion", "propose_disabled_pairs", "raycast", "read_sweep", "repaired", "self_collisions",
-    "self_overlapping_cells", "shape_cast", "signed_distances", "sweep", "tessellate", "time_of_impact", "to_library",
-    "verify", "walk",
+    "certify", "collide", "combine", "configuration_obstacle", "contacts", "contains", "distance", "enclosing_spheres",
+    "facet_pairs", "get_include", "get_library", "moved_poses", "overlap_volume", "overlapping_cells", "overlay",
+    "plan", "pose", "poses", "poses_in_motion", "propose_disabled_pairs", "raycast", "read_sweep", "repaired",
+    "self_collisions", "self_overlapping_cells", "shape_cast", "signed_distances", "smoothed_distances", "soft_minimum",
+    "sweep", "tessellate", "time_of_impact", "to_library", "verify", "walk",
 ]
 
 

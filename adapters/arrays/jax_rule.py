@@ -49,8 +49,8 @@ def _with_rule(A: Any, B: Any, subgradient: bool) -> Any:
         single = X.ndim == Y.ndim == 2 and not lengths
         return (values[0] if single else values), (of_x, of_y, X, Y)
 
-    def backward(kept, by_distance):
-        of_x, of_y, X, Y = kept
+    def backward(remaining, by_distance):
+        of_x, of_y, X, Y = remaining
         grown = by_distance.reshape(-1, 1, 1)
 
         def by(entries, pose):

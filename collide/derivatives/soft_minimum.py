@@ -12,8 +12,11 @@ from collide.errors import InvalidArgument
 
 
 class SoftMinimum(NamedTuple):
-    """value : (N,) [m].   gradient : (N, m), or ``None`` where none was handed in.   weights : (M,) shares of the rows,
-    which add up to 1 for each of N."""
+    """Smooth least distances of N groups of pairs.
+
+    value : (N,) [m].   gradient : (N, m) its derivatives; ``None`` of distances alone.
+    weights : (M,) shares of the rows in the gradient, which add up to 1 for each of N.
+    """
 
     value: np.ndarray
     gradient: np.ndarray | None
@@ -48,7 +51,7 @@ def soft_minimum(distances, gradients=None, *, sharpness: float, starts=None) ->
     d = checks.array("distances", distances, "(M,)", InvalidArgument)
     k = checks.length("sharpness", sharpness)
     if d.ndim != 1 or np.isnan(d).any() or (d == -math.inf).any():
-        raise InvalidArgument("distances must be (M,) numbers, none of them NaN or −inf")
+        raise InvalidArgument(f"distances must be (M,) numbers, without NaN and −inf, got {checks.brief(distances)}")
     if k == 0.0:
         raise InvalidArgument("sharpness must be above 0 [1/m]")
     ends = _ends(starts, len(d))
@@ -85,6 +88,6 @@ def _ends(starts, count: int) -> np.ndarray:
         return np.array([0, count])
     ends = checks.array("starts", starts, "(N + 1,)", InvalidArgument)
     if ends.ndim != 1 or not len(ends) or ends[0] != 0 or ends[-1] != count or (np.diff(ends) < 0).any():
-        told = checks.brief(starts)
-        raise InvalidArgument(f"starts must rise from 0 to the number of distances, {count}, got {told}")
+        shown = checks.brief(starts)
+        raise InvalidArgument(f"starts must rise from 0 to the number of distances, {count}, got {shown}")
     return ends.astype(np.int64)

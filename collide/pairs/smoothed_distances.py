@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 #: Below this angle [rad] the series of h'(θ) / (θ h(θ)) is used: −1/6 − θ²/360, off by θ⁴/15120.
 _SMALL = 2.0**-6
-_MOST_SAMPLES = 1 << 20
+_MAX_SAMPLES = 1 << 20
 
 
 class SmoothedDistances(NamedTuple):
@@ -90,8 +90,8 @@ def smoothed_distances(
     """
     sigma, tau = checks.length("angle", angle), checks.length("length", length)
     n = checks.integer("samples", samples, 4)
-    if n % 2 or n > _MOST_SAMPLES:
-        raise InvalidArgument(f"samples must be an even number, 4 ... {_MOST_SAMPLES}, got {n}")
+    if n % 2 or n > _MAX_SAMPLES:
+        raise InvalidArgument(f"samples must be an even number, 4 ... {_MAX_SAMPLES}, got {n}")
     if checks.integer("order", order, 0) > 1:
         raise InvalidArgument(f"order must be 0 or 1, got {order}")
     if order == 0 and not (sigma > 0.0 and tau > 0.0):

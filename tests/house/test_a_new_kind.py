@@ -127,7 +127,7 @@ EDITS = {
     ],
     "__init__.py": [
         ('    "collide.shapes.tessellation": (', '    "collide.shapes.primitives": ("Bicone",),\n'),
-        ('    "ConvexHull", "ConvexPolygon",', '    "Bicone",\n'),
+        ('    "BooleanResult", "Box",', '    "Bicone",\n'),
     ],
 }
 #: Closed forms: a double cone of radius 0.5 and half length 1, unturned.

@@ -179,6 +179,11 @@ def checker() -> collide.RobotChecker:
     return collide.RobotChecker(robot(), world(), attached=held)
 
 
+def poses_of_worlds() -> np.ndarray:
+    """(2, n, 4, 4) poses of all bodies of `world` in two worlds."""
+    return np.tile(EYE, (2, len(world().ids), 1, 1))
+
+
 def world() -> collide.World:
     made = collide.World()
     made.add(collide.Box((1, 1, 1)), name="a")
@@ -280,6 +285,10 @@ GOOD: dict[str, Callable[[], dict[str, Any]]] = {
     "certify": lambda: {**PAIR, "r": collide.distance(**PAIR)},
     "collide": lambda: PAIR,
     "distance": lambda: PAIR,
+    "smoothed_distances": lambda: {**PAIR, "angle": 0.1, "length": 0.01, "samples": 8},
+    "WorldBatch": lambda: {"world": world()},
+    "to_library": lambda: {"values": np.eye(3), "like": "numpy"},
+    "soft_minimum": lambda: {"distances": [0.1, 0.3], "gradients": [[1.0], [2.0]], "sharpness": 20.0},
     "contacts": lambda: PAIR,
     "walk": lambda: {**PAIR, "B": BOX},
     "combine": lambda: {"shapes": [mesh(), BOX], "poses": [EYE, EYE], "rule": "union"},
@@ -416,6 +425,8 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "PairDerivatives": lambda: collide.distance(**PAIR, derivatives=True),
     "PairResult": lambda: collide.distance(**PAIR),
     "RayHits": lambda: collide.raycast(**GOOD["raycast"]()),
+    "WorldBatch": lambda: collide.WorldBatch(world()),
+    "WorldBatchResult": lambda: collide.WorldBatch(world()).distances(poses_of_worlds()),
     "WorldResult": lambda: world().distances(),
     "WorldHits": lambda: world().raycast((0, 0, 5), (0, 0, -1)),
     "Proposal": lambda: collide.propose_disabled_pairs(**GOOD["propose_disabled_pairs"]()),
@@ -505,7 +516,13 @@ METHODS: dict[str, Callable[[], dict[str, Any]]] = {
     "World.shape_cast": lambda: {"shape": BOX, "X_WS": EYE, "direction_W": (1, 0, 0)},
     "World.sleep": lambda: {"bodies": ["a"]},
     "World.wake": lambda: {"bodies": ["a"]},
+    "WorldBatch.collides": lambda: {"X_WBs": poses_of_worlds()},
+    "WorldBatch.distances": lambda: {"X_WBs": poses_of_worlds()},
+    "WorldBatch.minimum": lambda: {"X_WBs": poses_of_worlds()},
     "WorldResult.pair": lambda: {"k": 0},
+    **{f"{result}.to": lambda: {"like": "numpy"} for result in (
+        "PairDerivatives", "PairResult", "WorldBatchResult", "WorldResult"
+    )},
     "scenes.Scene.add": lambda: {"body": scenes.SceneBody("n", BOX, EYE)},
     "scenes.Scene.body": lambda: {"name": "a"},
     "scenes.Scene.joint_shares": lambda: {"values": {"slide": 0.0}},
@@ -545,6 +562,8 @@ EXCUSED = {
     "transforms.inverse_pose": "of poses that loaders and hosts have made",
     "How": "an enumeration of Python's own",
     "WorldResult": "made by World's queries",
+    "WorldBatchResult": "made by WorldBatch's queries",
+    "transforms.unchecked_poses": "for kernels, which check what it reads",
     "WorldHits": "made by World's queries",
     "PairDerivatives": "made by queries",
     "PairResult": "made by queries",
