@@ -46,7 +46,10 @@ import numpy as np
 
 from collide.base import argument_checks as checks
 from collide.base.array_libraries import to_library
+from collide.base.lazy_modules import lazy_module
 from collide.errors import InvalidArgument
+
+notebook_html = lazy_module("collide.base.notebook_html")
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -263,6 +266,33 @@ class PairResult(Generic[Form]):
             )
         return f"PairResult(<{len(self.rows)} rows>, hits={int(self.rows['hit'].sum())})"
 
+    def _repr_html_(self) -> str:
+        head = ("pair", "distance [m]", "lower", "upper", "hit", "decided by")
+        listed = [
+            (k, *(f"{row[name]:.6g}" for name in ("distance", "lower", "upper")), bool(row["hit"]), HOW[row["how"]])
+            for k, row in enumerate(self.rows)
+        ]
+        return notebook_html.page_of(repr(self), np.zeros((0, 3, 3)), np.zeros((0, 3)), head, listed)
+
+
+def with_columns(dtype: np.dtype) -> Callable[[type], type]:
+    """Decorates results of many rows: every field of their ``rows`` is an attribute, a column, as of a `PairResult`."""
+
+    def decorate(cls: type) -> type:
+        for name in dtype.names or ():
+            if not hasattr(cls, name):
+                setattr(cls, name, _column(name))
+        return cls
+
+    return decorate
+
+
+def _column(name: str) -> property:
+    def column(self: Any) -> np.ndarray:
+        return self.rows[name]
+
+    return property(column, doc=f"``{name}``, row by row.")
+
 
 def field_at(dtype: np.dtype, field: str, unit: int) -> int:
     """Where a field of a record begins, in units of so many bytes."""
@@ -327,6 +357,7 @@ def row_number(k, count: int) -> int:
         raise InvalidArgument(f"k must be the number of a result, got {checks.brief(k)}") from None
 
 
+@with_columns(PAIR_DTYPE)
 class WorldResult:
     """Rows of a World query, sorted by (a, b), with the bodies as they stood.
 
@@ -338,11 +369,33 @@ class WorldResult:
 
     Notes
     -----
-    Indexing by the name of a field gives a column, by a number a row, by a slice or a mask rows. ``names``
-    resolves the ids; ``pair(k)`` is row k as a `PairResult`, with its certificate.
+    Every field is an attribute, a column, as of a `PairResult` of a batch. Indexing by the name of a field gives the
+    column, by a number a row, by a slice or a mask rows. ``names`` resolves the ids; ``pair(k)`` is row k as a
+    `PairResult`, with its certificate.
     """
 
     __slots__ = ("_bodies", "_certify", "rows")
+
+    if TYPE_CHECKING:
+        distance: Floats
+        lower: Floats
+        upper: Floats
+        normal: Floats
+        point_a: Floats
+        point_b: Floats
+        hit: Bools
+        certified: Bools
+        beyond: Bools
+        how: Ints
+        iterations: Ints
+        exact: Bytes
+        count: Ints
+        a: Ints
+        b: Ints
+        part_a: Ints
+        part_b: Ints
+        vertices_a: Ints
+        vertices_b: Ints
 
     def __init__(self, rows: np.ndarray, bodies: Mapping, certify: Callable):
         self.rows, self._bodies, self._certify = rows, bodies, certify
@@ -412,4 +465,15 @@ class WorldResult:
         return [(self._bodies[int(a)].name, self._bodies[int(b)].name) for a, b in zip(self.rows["a"], self.rows["b"])]
 
     def __repr__(self) -> str:
-        return f"WorldResult({len(self.rows)} rows, {int(self.rows['hit'].sum())} hits)"
+        least = f", least distance {float(self.rows['distance'].min()):.6g} m" if len(self.rows) else ""
+        return f"WorldResult({len(self.rows)} rows, {int(self.rows['hit'].sum())} hits{least})"
+
+    def _repr_html_(self) -> str:
+        order = np.argsort(self.rows["distance"], kind="stable")
+        names = self.names
+        head = ("body a", "body b", "distance [m]", "known to [m]", "decided by")
+        listed = [
+            (*names[k], f"{row['distance']:.6g}", f"{row['upper'] - row['lower']:.0e}", HOW[row["how"]])
+            for k, row in zip(order.tolist(), self.rows[order])
+        ]
+        return notebook_html.page_of(repr(self), np.zeros((0, 3, 3)), np.zeros((0, 3)), head, listed)

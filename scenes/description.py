@@ -12,12 +12,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from collide.base import argument_checks as checks
+from collide.base.lazy_modules import lazy_module
 from collide.errors import InvalidArgument, InvalidPose, SceneError, brief, cut, listing
 from collide.robots.robot import LinkShape, Robot
 from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape
 from collide.transforms import as_pose, as_poses
 from collide.worlds.world import World
+
+#: With triangles, for notebooks alone.
+shape_html = lazy_module("collide.shapes.shape_html")
 
 
 @dataclass
@@ -53,6 +57,16 @@ class SceneBody:
     source: str = ""
     approximation: str | None = None
     owner: str | None = None
+
+    def __repr__(self) -> str:
+        place = ", ".join(f"{x:.6g}" for x in np.asarray(self.X_WB)[:3, 3].tolist())
+        more = "".join(
+            f", {text}" for text in ("static" if self.static else "", self.owner and f"of {self.owner}") if text
+        )
+        return f"SceneBody({self.name!r}, {self.shape!r}, at ({place}){more})"
+
+    def _repr_html_(self) -> str:
+        return shape_html.bodies_html(repr(self), [self], 1)
 
 
 @dataclass
@@ -126,6 +140,15 @@ class Scene:
     state_notes: list[str] = field(default_factory=list)
     #: body name -> its source, as far as `add` knows: so that ten thousand bodies are added in one pass
     _sources: dict[str, str] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    def __repr__(self) -> str:
+        n_static = sum(bool(body.static) for body in self.bodies)
+        robots = f", robots: {', '.join(self.robots)}" if self.robots else ""
+        notes = f", {len(self.notes)} notes" if self.notes else ""
+        return f"Scene({self.name!r}, {len(self.bodies)} bodies ({n_static} static){robots}{notes})"
+
+    def _repr_html_(self) -> str:
+        return shape_html.bodies_html(repr(self), self.bodies[: shape_html.MAX_DRAWN], len(self.bodies))
 
     @property
     def state(self) -> dict[str, float]:

@@ -155,7 +155,12 @@ _SCENES = """examples:
   collide scenes --copy workcell             to ./workcell.json, for editing
   collide scenes --copy workcell cell.json && collide report cell.json"""
 
-_DOCTOR = """Shows versions, optional packages and the extras that bring them, where compiled
+_DOCTOR = """examples:
+  collide doctor
+  collide doctor && collide report workcell       only where all is sound
+  COLLIDE_CACHE_DIR=/tmp/c collide doctor         another folder for caches
+
+Shows versions, optional packages and the extras that bring them, where compiled
 kernels and prepared inputs are kept, and asks a few pairs with known answers.
 
 exit status: 0 sound, 1 something is broken"""

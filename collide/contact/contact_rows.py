@@ -29,6 +29,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, overload
 import numpy as np
 
 from collide.errors import InvalidArgument
+from collide.results import with_columns
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -87,13 +88,33 @@ def _middles(rows: np.ndarray) -> np.ndarray:
     return 0.5 * rows["point_a"] + 0.5 * rows["point_b"]
 
 
+@with_columns(CONTACT_DTYPE)
 class WorldContacts:
     """Contacts of a World: ``rows`` (CONTACT_DTYPE) sorted by (a, b), with ids of bodies; ``names`` resolves them.
 
-    Indexing by a field name gives that column.
+    Every field is an attribute, a column, as of `Contacts`; indexing by the name of a field gives the column, too.
     """
 
     __slots__ = ("_bodies", "rows")
+
+    if TYPE_CHECKING:
+        distance: Floats
+        lower: Floats
+        upper: Floats
+        apart: Floats
+        normal: Floats
+        point_a: Floats
+        point_b: Floats
+        a: Ints
+        b: Ints
+        part_a: Ints
+        part_b: Ints
+        facet_a: Ints
+        facet_b: Ints
+        feature_a: Ints
+        feature_b: Ints
+        patch: Ints
+        kind: Ints
 
     def __init__(self, rows: np.ndarray, bodies: dict):
         self.rows, self._bodies = rows, bodies

@@ -13,10 +13,13 @@ import numpy as np
 from collide.base import argument_checks as checks
 from collide.base.foreign_names import advice_on_shape
 from collide.base.fork_safe_lock import ForkSafeLock
+from collide.base.lazy_modules import lazy_module
 from collide.errors import InvalidArgument, InvalidShape, brief
 from collide.transforms import LARGEST, SMALLEST
 
 T = TypeVar("T")
+#: With triangles, for notebooks alone.
+shape_html = lazy_module("collide.shapes.shape_html")
 
 
 class Shape:
@@ -160,6 +163,9 @@ class Shape:
 
     def __hash__(self) -> int:
         return hash((type(self).__name__, self._key()))
+
+    def _repr_html_(self) -> str:
+        return shape_html.shape_html(self)
 
     def __repr__(self) -> str:
         fields = ", ".join(f"{f}={_brief(getattr(self, f))}" for f in self._fields)

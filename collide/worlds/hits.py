@@ -20,10 +20,12 @@ at_start        of casts: whether they touch before they move
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from collide.casts.ray_hits import WORLD_HIT_DTYPE
+from collide.results import with_columns
 from collide.worlds.bodies import Roster
 
 
@@ -37,6 +39,7 @@ def empty_hits(n: int) -> np.ndarray:
     return rows
 
 
+@with_columns(WORLD_HIT_DTYPE)
 class WorldHits:
     """Rows of a cast against a World: a row a question, or with ``all_hits`` a row for each place on a ray.
 
@@ -48,11 +51,25 @@ class WorldHits:
 
     Notes
     -----
-    Indexing by the name of a field gives a column, by a number a row, by a slice or a mask rows. ``names`` are the
-    names of the bodies row by row, ``None`` where nothing is met.
+    Every field is an attribute, a column. Indexing by the name of a field gives the column, by a number a row, by a
+    slice or a mask rows. ``names`` are the names of the bodies row by row, ``None`` where nothing is met.
     """
 
     __slots__ = ("_roster", "rows", "starts")
+
+    if TYPE_CHECKING:
+        distance: np.ndarray
+        lower: np.ndarray
+        upper: np.ndarray
+        normal: np.ndarray
+        point: np.ndarray
+        ray: np.ndarray
+        body: np.ndarray
+        item: np.ndarray
+        facet: np.ndarray
+        hit: np.ndarray
+        certified: np.ndarray
+        at_start: np.ndarray
 
     def __init__(self, rows: np.ndarray, roster: Roster, starts: np.ndarray | None = None):
         self.rows, self._roster, self.starts = rows, roster, starts

@@ -18,6 +18,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from collide.errors import InvalidArgument, UnsupportedQuery
+from collide.results import with_columns
 from collide.solids.overlap_volume import overlap_volume
 from collide.worlds.packed_world import PackedWorld
 
@@ -31,6 +32,7 @@ OVERLAP_DTYPE = np.dtype(
 _FIELDS = ("volume", "lower", "upper", "centroid", "area_a", "area_b", "patch_area", "flush_area")
 
 
+@with_columns(OVERLAP_DTYPE)
 class WorldOverlaps:
     """Rows of `World.overlaps`, sorted by (a, b).
 

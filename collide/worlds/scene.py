@@ -14,6 +14,7 @@ import numpy as np
 from collide.base import argument_checks as checks
 from collide.base.foreign_arguments import foreign_arguments
 from collide.base.fork_safe_lock import ForkSafeLock
+from collide.base.lazy_modules import lazy_module
 from collide.base.log import log_duration
 from collide.errors import InvalidArgument
 from collide.pairs.security_margin import checked_margin
@@ -21,6 +22,11 @@ from collide.shapes.shape import Shape, checked_shape
 from collide.worlds.bodies import Body, Roster, WorldBodies
 from collide.worlds.packed_world import STALE, PackedWorld, PairFilters
 from collide.worlds.ready_shapes import make_ready
+
+#: With triangles, for notebooks alone.
+shape_html = lazy_module("collide.shapes.shape_html")
+#: Bodies that a repr names.
+_NAMED = 4
 
 
 class WorldReading(NamedTuple):
@@ -373,6 +379,17 @@ class WorldScene:
         for i, j in np.argwhere(np.triu(matrix, 1)).tolist():
             self._allowed.setdefault((ids[i], ids[j]), reason)
             self._note_partners((ids[i], ids[j]))
+
+    def __repr__(self) -> str:
+        names = list(self.names.values())
+        more = ", …" if len(names) > _NAMED else ""
+        return f"World({len(names)} bodies{': ' if names else ''}{', '.join(names[:_NAMED])}{more})"
+
+    def _repr_html_(self) -> str:
+        with self._lock.now:
+            ids = self._bodies.ids
+            bodies = [self._bodies.body(identity) for identity in ids[: shape_html.MAX_DRAWN]]
+        return shape_html.bodies_html(repr(self), bodies, len(ids))
 
     def __len__(self) -> int:
         return len(self._bodies)

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import json
 import os
+import re
+import shlex
 import subprocess
 import sys
 from types import SimpleNamespace
@@ -16,6 +18,7 @@ import numpy as np
 import pytest
 
 import collide.scenes
+from collide.cli import arguments
 from collide.cli import main as cli
 from collide.errors import MissingExtra, SceneError
 from collide.results import HOW, PAIR_DTYPE, PLANE, SIMPLEX, UNDECIDED, WorldResult
@@ -276,6 +279,15 @@ def run(*arguments, code=None, **options):
     command = [sys.executable, "-c", code] if code else [sys.executable, "-m", "collide", *arguments]
     options.setdefault("env", {**os.environ, "NO_COLOR": "1"})
     return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, **options)
+
+
+@pytest.mark.parametrize("command", sorted(cli._COMMANDS))
+def test_help_teaches_by_three_examples_that_parse(command, capsys):
+    assert cli.main([command, "--help"]) == 0
+    examples = capsys.readouterr().out.split("examples:\n")[1].split("\n\n")[0].splitlines()
+    calls = [re.split(r"\s{2,}|[|#)]|&&", part)[0] for line in examples for part in re.findall(r"collide .*", line)[:1]]
+    commands = [arguments.parse(shlex.split(call)[1:]).command for call in calls]
+    assert commands.count(command) >= 3, calls
 
 
 def test_help_and_version_import_neither_numpy_nor_numba():
