@@ -11,7 +11,7 @@ from collide.errors import InvalidPose, MissingExtra
 
 
 def jax_distance(A, B, X_WA, X_WB, *, subgradient: bool = False):
-    """Signed distances as an array with a rule for `jax.grad` and `jax.vjp`; may be traced by `jax.jit` and `jax.vmap`.
+    """Signed distances as an array with a rule for reverse derivatives; may be traced by ``jit`` and ``vmap``.
 
     A, B : two shapes, or sequences of N.   X_WA, X_WB : (4, 4) or (N, 4, 4) arrays of floats; a single pose goes with
     every pose of the other's batch.   subgradient : as of `torch_distance`.
@@ -49,8 +49,8 @@ def _with_rule(A: Any, B: Any, subgradient: bool) -> Any:
         single = X.ndim == Y.ndim == 2 and not lengths
         return (values[0] if single else values), (of_x, of_y, X, Y)
 
-    def backward(remaining, by_distance):
-        of_x, of_y, X, Y = remaining
+    def backward(residuals, by_distance):
+        of_x, of_y, X, Y = residuals
         grown = by_distance.reshape(-1, 1, 1)
 
         def by(entries, pose):
