@@ -162,7 +162,8 @@ typedef struct collide_pair {
 
 /* Flags of queries, to be joined by |; 0 for none. */
 enum {
-    COLLIDE_TRUST_POSES = 1, /* matrices need be no rotations; that they are finite and end in 0 0 0 1 is still checked */
+    COLLIDE_TRUST_POSES = 1, /* matrices need be no rotations; that they are finite and end in 0 0 0 1 is still checked. A singular
+                                matrix leaves a half-space no plane: such rows are not certified, and their bracket is NaN */
     COLLIDE_UNSIGNED = 2     /* of distances: gaps are all that is wanted. Bodies that meet are at distance 0, with normal 0 */
 };
 

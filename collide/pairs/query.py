@@ -77,7 +77,8 @@ def collide(
         and where the margin lies within the bracket by growing a body (`security_margin.py`): exactly between polytopes
         and balls swept over them. Goes with neither axes nor algorithm, and costs what `distance` does.
     check_poses : bool
-        Refuse matrices that are no rotation.
+        Refuse matrices that are no rotation. Else matrices are trusted: bodies are their images, and a half-space in a
+        singular matrix has no plane, rows that are not certified, and a bracket of NaN.
     threads : int
         Answer a batch in at most so many threads; the answers are the same bits.
     axes : (N, 3) float64, optional
