@@ -65,13 +65,14 @@ def soft_minimum(distances, gradients=None, *, sharpness: float, starts=None) ->
     weights /= np.where(total > 0.0, total, 1.0)[of]
     with np.errstate(divide="ignore"):
         value = np.where(total > 0.0, shift - np.log(total) / k, math.inf)
-    return SoftMinimum(value, None if gradients is None else _weighted(gradients, weights, of, n), weights)
+    return SoftMinimum(value, None if gradients is None else _weighted(gradients, distances, weights, of, n), weights)
 
 
-def _weighted(gradients, weights: np.ndarray, of: np.ndarray, n: int) -> np.ndarray:
+def _weighted(gradients, distances, weights: np.ndarray, of: np.ndarray, n: int) -> np.ndarray:
     g = checks.array("gradients", gradients, "(M, m)", InvalidArgument)
     if g.ndim != 2 or len(g) != len(weights):
-        raise InvalidArgument(f"gradients must be ({len(weights)}, m), a row for each distance, got {g.shape}")
+        wanted = f"({len(weights)}, m), a row for each of distances, {checks.brief(distances)}"
+        raise InvalidArgument(f"gradients must be {wanted}; got {g.shape}")
     lost = np.isnan(g).any(axis=1) & (weights > 0.0)
     if lost.any():
         row = int(np.argmax(lost))
@@ -88,6 +89,6 @@ def _ends(starts, count: int) -> np.ndarray:
         return np.array([0, count])
     ends = checks.array("starts", starts, "(N + 1,)", InvalidArgument)
     if ends.ndim != 1 or not len(ends) or ends[0] != 0 or ends[-1] != count or (np.diff(ends) < 0).any():
-        shown = checks.brief(starts)
-        raise InvalidArgument(f"starts must rise from 0 to the number of distances, {count}, got {shown}")
+        text = checks.brief(starts)
+        raise InvalidArgument(f"starts must rise from 0 to the number of distances, {count}, got {text}")
     return ends.astype(np.int64)

@@ -14,7 +14,6 @@ from collide.base import argument_checks as checks
 from collide.base.lazy_modules import lazy_module
 from collide.errors import InvalidArgument
 from collide.lowering.closed_regions import closed, sizes_at
-from collide.lowering.facet_bodies import has_facets
 from collide.lowering.kind_of_shape import kind_of
 from collide.narrowphase.convex_batches import Question
 from collide.narrowphase.dispatch import Method, method_of
@@ -26,6 +25,7 @@ from collide.shapes.shape import Shape
 from collide.shapes.swept_mesh import SweptMesh
 
 #: Loaded when a least depth is first asked for.
+facet_bodies = lazy_module("collide.lowering.facet_bodies")
 of_unions = lazy_module("collide.narrowphase.composite.least_depth")
 of_mesh_unions = lazy_module("collide.narrowphase.composite.least_mesh_depth")
 of_facets = lazy_module("collide.narrowphase.facets.least_facet_depth")
@@ -90,7 +90,7 @@ def _with_a_search(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, lengt
 
 def _are_of_facets(*shapes: Shape) -> bool:
     """Whether shapes are facets with a ball swept over them."""
-    return all(isinstance(shape, SweptMesh) or has_facets(shape) for shape in shapes)
+    return all(isinstance(shape, SweptMesh) or facet_bodies.has_facets(shape) for shape in shapes)
 
 
 def _search_of(A: Shape, B: Shape):

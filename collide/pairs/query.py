@@ -11,9 +11,9 @@ import numpy as np
 
 from collide.base import argument_checks as checks
 from collide.base.array_libraries import library_of, to_library
+from collide.base.lazy_modules import lazy_module
 from collide.base.threads import check_threads
 from collide.certificates.make_certificate import certify
-from collide.derivatives.pair_derivatives import PairDerivatives
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.lowering.kind_of_shape import kind_of
 from collide.narrowphase.convex_batches import Question
@@ -28,9 +28,12 @@ from collide.pairs.security_margin import checked_margin, within
 from collide.results import PairResult
 from collide.shapes.shape import Shape
 
+pair_derivatives = lazy_module("collide.derivatives.pair_derivatives")
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from collide.derivatives.pair_derivatives import PairDerivatives
     from collide.results import Single
     from collide.transforms import Pose, PoseLike
 
@@ -287,7 +290,7 @@ def distance(
     if checks.true_or_false("derivatives", derivatives):
         options = {"check_poses": check_poses, "threads": threads, "algorithm": algorithm}
         result = distance(A, B, X_WA, X_WB, max_distance=max_distance, signed=signed, depth=depth, **options)
-        return PairDerivatives(result, partial(_rows_again, check_threads(threads)))
+        return pair_derivatives.PairDerivatives(result, partial(_rows_again, check_threads(threads)))
     limit = checks.limit("max_distance", max_distance)
     signed = checks.true_or_false("signed", signed)
     least = checked_depth(depth) and signed

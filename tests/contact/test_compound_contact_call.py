@@ -138,7 +138,8 @@ def test_faces_of_few_parts_are_made(monkeypatch):
     A, B = union(), union()
     hits = 0
     for turn in range(12):
-        X_WB = collide.pose((0.3 * turn, 0.0, 5.5), rpy=(0.0, 0.0, turn)) if turn < 8 else collide.pose((0.5, 0, -11.8))
+        beside = collide.pose((0.3 * turn, 0.0, 5.5), rpy=(0.0, 0.0, turn % 6.0))
+        X_WB = beside if turn < 8 else collide.pose((0.5, 0, -11.8))
         rows = collide.contacts(A, B, EYE, X_WB, margin=0.05).rows
         hits += len(rows) > 0
         assert rows.tobytes() == contact_batch(A, B, EYE[None], X_WB[None], 1, 0.05, 8)[0].tobytes()

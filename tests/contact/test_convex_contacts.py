@@ -285,9 +285,9 @@ def test_single_calls_share_a_workspace_that_grows():
     """Pairs prepared while it was small answer as before after a face of 300 corners has made it larger."""
     angle = np.linspace(0, 2 * np.pi, 301)[:-1]
     ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(300)], axis=1)
-    prism = collide.ConvexHull(np.concatenate([ring, ring + np.array((0, 0, 1))]))
+    prism, A = collide.ConvexHull(np.concatenate([ring, ring + np.array((0, 0, 1))])), collide.Box((1, 1, 1))
     small = [
-        (collide.Box((1, 1, 1)), collide.Box((1, 1, k / 4)), collide.pose((0.1 * k, 0.2, k / 8 + 0.4), rpy=(0, 0, k)))
+        (A, collide.Box((1, 1, k / 4)), collide.pose((0.1 * k, 0.2, k / 8 + 0.4), rpy=(0, 0, 0.7 * k)))
         for k in range(1, 9)
     ]
     before = [collide.contacts(A, B, EYE, X).rows for A, B, X in small]
