@@ -433,7 +433,7 @@ class Carrying:
             self.detach()
 
 
-@pytest.mark.parametrize("form", ["hulls", "padded", "spheres", "meshes"])
+@pytest.mark.parametrize("form", ["hulls", "padded", "spheres", pytest.param("meshes", marks=pytest.mark.slow)])
 def test_objects_attached_in_c_have_pythons_bits(form, tmp_path):
     """After every change, and after moves of bodies around, C has the bits of the checker that carries the same."""
     rng = rng_of("carried in C", form)
