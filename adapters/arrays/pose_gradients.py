@@ -13,6 +13,8 @@ rotations would do to the distance has no part in G.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 import collide
@@ -28,7 +30,7 @@ def distances_with_gradients(
         where no gradient is active.
     """
     X_WA, X_WB, _ = asked_poses(A, B, X_WA, X_WB)
-    r = collide.distance(A, B, X_WA, X_WB, derivatives=True)
+    r: Any = collide.distance(A, B, X_WA, X_WB, derivatives=True)
     of_a, of_b = r.d_distance_A.copy(), r.d_distance_B.copy()
     for k in np.flatnonzero(~r.unique).tolist() if subgradient else []:
         for both in r.active_gradients(k)[:1]:

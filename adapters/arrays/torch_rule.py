@@ -23,8 +23,8 @@ def _rule() -> tuple[Any, Any]:
     class Distance(torch.autograd.Function):
         @staticmethod
         def forward(ctx: Any, A, B, X_WA, X_WB, subgradient):
-            poses = [np.asarray(X.detach(), dtype=np.float64) for X in (X_WA, X_WB)]
-            values, *gradients = distances_with_gradients(A, B, *poses, subgradient)
+            X, Y = (np.asarray(pose.detach(), dtype=np.float64) for pose in (X_WA, X_WB))
+            values, *gradients = distances_with_gradients(A, B, X, Y, subgradient)
             ctx.save_for_backward(*(torch.from_numpy(G).to(X.dtype) for G, X in zip(gradients, (X_WA, X_WB))))
             ctx.shapes = X_WA.shape, X_WB.shape
             made = torch.from_numpy(np.array(values)).to(torch.promote_types(X_WA.dtype, X_WB.dtype))

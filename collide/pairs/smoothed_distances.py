@@ -18,7 +18,7 @@ Samples come in pairs of opposite motions. Standard errors are those of the mean
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -105,13 +105,14 @@ def smoothed_distances(
     shifts = motions[:, 3:] @ R_WB.transpose(0, 2, 1)
     X_moved[..., :3, 3] += shifts
     X_WA_all = np.repeat(X_WA, n, axis=0)
-    r = distance(A, B, X_WA_all, X_moved.reshape(-1, 4, 4), threads=threads, derivatives=order == 1)
+    options: dict[str, Any] = {"threads": threads, "derivatives": order == 1}
+    r: Any = distance(A, B, X_WA_all, X_moved.reshape(-1, 4, 4), **options)
     distances = r.distance.reshape(-1, n)
     if order == 1:
         by_b = r.d_distance_B.reshape(-1, n, 6).copy()
         by_b[..., :3] += np.cross(shifts, by_b[..., 3:])
     else:
-        without = distance(A, B, X_WA, X_WB, threads=threads).distance
+        without: Any = distance(A, B, X_WA, X_WB, threads=threads).distance
         by_b = (distances - without[:, None])[..., None] * _scores(motions, R_WB, sigma, tau)
     # The distance depends on the relative pose alone: moved alike, A and B undo each other.
     by_a = -by_b
