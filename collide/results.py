@@ -38,22 +38,22 @@ Invariants, asserted in the tests; u is a few units in the last place of the lar
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from enum import IntEnum
 from struct import Struct
 from typing import TYPE_CHECKING, Any, Generic, Literal, overload
 
 import numpy as np
 
 from collide.base import argument_checks as checks
-from collide.base.array_libraries import to_library
+from collide.base.array_libraries import ToLibrary
 from collide.base.lazy_modules import lazy_module
+from collide.base.worded_enum import WordedEnum
 from collide.errors import InvalidArgument
 
 notebook_html = lazy_module("collide.base.notebook_html")
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-    from typing_extensions import Self, TypeVar
+    from typing_extensions import TypeVar
 
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int32]
@@ -78,14 +78,12 @@ else:
     Form = TypeVar("Form")
 
 
-class How(IntEnum):
+class How(WordedEnum):
     """Which argument decided a pair. A proof stands against both poses as given, entries taken as exact reals.
 
     Members are the integers of the field ``how``, print as the words of a report, and say what they mean: ``How(1)``,
     ``str(How(1))`` = "separating plane", ``How(1).meaning``.
     """
-
-    meaning: str
 
     UNDECIDED = 0, "the bracket reaches to both sides of 0: touching within rounding"
     SEPARATING_PLANE = 1, "a plane with all of A on one side and all of B on the other"
@@ -93,18 +91,6 @@ class How(IntEnum):
     SWEPT_OVERLAP = 3, "two core points nearer than the sum of the radii"
     CLOSED_FORM = 4, "a formula with an error bound: spheres, capsules, half-spaces"
     EXACT_ARITHMETIC = 5, "integers, where doubles leave the sign open or the last digit of a gap or depth"
-
-    def __new__(cls, value: int, meaning: str) -> Self:
-        member = int.__new__(cls, value)
-        member._value_ = value
-        member.meaning = member.__doc__ = meaning
-        return member
-
-    def __str__(self) -> str:
-        return self.name.lower().replace("_", " ")
-
-    def __format__(self, spec: str) -> str:
-        return format(str(self), spec)
 
 
 #: Words of the arguments that decide, by the value of the field ``how``.
@@ -158,7 +144,7 @@ class Batch:
 Question = tuple[Any, Any, np.ndarray, np.ndarray]
 
 
-class PairResult(Generic[Form]):
+class PairResult(ToLibrary, Generic[Form]):
     """Answer of a pair query: the fields of `PAIR_DTYPE` as attributes.
 
     Parameters
@@ -211,24 +197,6 @@ class PairResult(Generic[Form]):
         """
         return self._certify(*self.question, self)
 
-    def to(self, like: Any) -> Any:
-        """The same result with arrays of PyTorch or JAX in place of NumPy's (`collide.to_library`).
-
-        Parameters
-        ----------
-        like : "numpy", "torch", "jax", or an array of one of these libraries.
-
-        Returns
-        -------
-        An object with the same fields. Tensors of PyTorch share memory with ``rows``; numbers of a single result stay
-        Python's.
-
-        Raises
-        ------
-        InvalidArgument, MissingExtra
-        """
-        return to_library(self, like)
-
     @overload
     def __getitem__(self, k: int) -> PairResult[Single]: ...
     @overload
@@ -268,11 +236,11 @@ class PairResult(Generic[Form]):
 
     def _repr_html_(self) -> str:
         head = ("pair", "distance [m]", "lower", "upper", "hit", "decided by")
-        listed = [
+        listed = (
             (k, *(f"{row[name]:.6g}" for name in ("distance", "lower", "upper")), bool(row["hit"]), HOW[row["how"]])
             for k, row in enumerate(self.rows)
-        ]
-        return notebook_html.page_of(repr(self), np.zeros((0, 3, 3)), np.zeros((0, 3)), head, listed)
+        )
+        return notebook_html.page_of(repr(self), head, listed, len(self.rows))
 
 
 def with_columns(dtype: np.dtype) -> Callable[[type], type]:
@@ -358,7 +326,7 @@ def row_number(k, count: int) -> int:
 
 
 @with_columns(PAIR_DTYPE)
-class WorldResult:
+class WorldResult(ToLibrary):
     """Rows of a World query, sorted by (a, b), with the bodies as they stood.
 
     Parameters
@@ -419,23 +387,6 @@ class WorldResult:
         a, b = self._bodies[int(row["a"])], self._bodies[int(row["b"])]
         return PairResult(row.reshape(1), True, (a.shape, b.shape, a.X_WB[None], b.X_WB[None]), self._certify)
 
-    def to(self, like: Any) -> Any:
-        """The same rows with columns as arrays of PyTorch or JAX (`collide.to_library`).
-
-        Parameters
-        ----------
-        like : "numpy", "torch", "jax", or an array of one of these libraries.
-
-        Returns
-        -------
-        An object with the same columns.
-
-        Raises
-        ------
-        InvalidArgument, MissingExtra
-        """
-        return to_library(self, like)
-
     def __len__(self) -> int:
         return len(self.rows)
 
@@ -470,10 +421,12 @@ class WorldResult:
 
     def _repr_html_(self) -> str:
         order = np.argsort(self.rows["distance"], kind="stable")
-        names = self.names
         head = ("body a", "body b", "distance [m]", "known to [m]", "decided by")
-        listed = [
-            (*names[k], f"{row['distance']:.6g}", f"{row['upper'] - row['lower']:.0e}", HOW[row["how"]])
-            for k, row in zip(order.tolist(), self.rows[order])
-        ]
-        return notebook_html.page_of(repr(self), np.zeros((0, 3, 3)), np.zeros((0, 3)), head, listed)
+        listed = (
+            (
+                *(self._bodies[int(row[body])].name for body in ("a", "b")),
+                f"{row['distance']:.6g}", f"{row['upper'] - row['lower']:.0e}", HOW[row["how"]],
+            )
+            for row in self.rows[order]
+        )
+        return notebook_html.page_of(repr(self), head, listed, len(self.rows))

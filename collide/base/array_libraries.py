@@ -175,6 +175,30 @@ def as_bound(values: np.ndarray, towards: float) -> np.ndarray:
         return np.where(is_off, np.nextafter(narrow, np.float32(towards)), narrow)
 
 
+class ToLibrary:
+    """Results whose arrays may be those of another library."""
+
+    __slots__ = ()
+
+    def to(self, like: Any) -> Any:
+        """The same result with arrays of PyTorch or JAX in place of NumPy's (`collide.to_library`).
+
+        Parameters
+        ----------
+        like : "numpy", "torch", "jax", or an array of one of these libraries.
+
+        Returns
+        -------
+        An object with the same fields and columns. Tensors of PyTorch share memory with ``rows``; numbers of a single
+        result stay Python's.
+
+        Raises
+        ------
+        InvalidArgument, MissingExtra
+        """
+        return to_library(self, like)
+
+
 class ResultIn:
     """A result with arrays of a library: fields by attribute, columns and rows by index, as of ``result``."""
 

@@ -7,6 +7,7 @@ import html
 import struct
 import zlib
 from collections.abc import Iterable, Sequence
+from itertools import islice
 
 import numpy as np
 
@@ -19,31 +20,35 @@ _MAX_FILLED = 4_000
 #: Corners that are drawn at most.
 _MAX_POINTS = 600_000
 #: Rows of a table.
-MAX_ROWS = 12
-GREY = (121, 160, 190)
+_MAX_ROWS = 12
+_GREY = (121, 160, 190)
 
 
-def page_of(title: str, triangles: np.ndarray, colours: np.ndarray, head: Sequence[str], rows: Iterable) -> str:
-    """A title, a picture where there are triangles, and the first rows of a table.
+def page_of(
+    title: str, head: Sequence[str] = (), rows: Iterable[Sequence] = (), n_rows: int = 0,
+    triangles: np.ndarray | None = None,
+) -> str:
+    """A title, a picture where triangles are given, and the first rows of a table.
 
-    triangles : (n, 3, 3) corners [m].   colours : (n, 3) red, green and blue of 255.   rows : texts, a list a row.
+    rows : cells, a sequence a row; of ``n_rows`` the first `_MAX_ROWS` are read.   triangles : (n, 3, 3) corners [m].
     """
     picture = ""
-    if len(triangles):
-        data = base64.b64encode(_png(_drawn(triangles, colours))).decode()
+    if triangles is not None and len(triangles):
+        data = base64.b64encode(_png(_drawn(triangles, np.tile(_GREY, (len(triangles), 1))))).decode()
         picture = f'<img width="{_WIDTH}" height="{_HEIGHT}" alt="" src="data:image/png;base64,{data}"/>'
-    return f"<div><code>{html.escape(title)}</code><br/>{picture}{_table(head, list(rows))}</div>"
+    table = _table(head, list(islice(rows, _MAX_ROWS)), n_rows)
+    return f"<div><code>{html.escape(title)}</code><br/>{picture}{table}</div>"
 
 
-def _table(head: Sequence[str], rows: list) -> str:
+def _table(head: Sequence[str], rows: list, n_rows: int) -> str:
     if not rows:
         return ""
 
     def line(tag, cells):
         return "<tr>" + "".join(f"<{tag}>{html.escape(str(cell))}</{tag}>" for cell in cells) + "</tr>"
 
-    more = f"<p>… and {len(rows) - MAX_ROWS} more</p>" if len(rows) > MAX_ROWS else ""
-    return f"<table>{line('th', head)}{''.join(line('td', row) for row in rows[:MAX_ROWS])}</table>{more}"
+    more = f"<p>… and {n_rows - _MAX_ROWS} more</p>" if n_rows > _MAX_ROWS else ""
+    return f"<table>{line('th', head)}{''.join(line('td', row) for row in rows)}</table>{more}"
 
 
 def _drawn(triangles: np.ndarray, colours: np.ndarray) -> np.ndarray:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from enum import IntEnum
+from collide.base.worded_enum import WordedEnum
 
 
-class Uniqueness(IntEnum):
+class Uniqueness(WordedEnum):
     """Whether the signed distance of a pair has a derivative by the poses, or why not.
 
     Members are the integers of the field ``uniqueness`` of `PairDerivatives`, and say what they mean:
     ``Uniqueness(4).meaning``.
     """
-
-    meaning: str
 
     UNIQUE = 0, "the distance has a derivative by the poses"
     UNCERTAIN = 1, "the row is not certified"
@@ -23,15 +21,3 @@ class Uniqueness(IntEnum):
     SEVERAL_PARTS = 6, "several parts are as near, and part along other lines"
     NOT_CONVEX = 7, "the deciding part of a body is not known as a convex set"
     NOT_SETTLED = 8, "no features of the surfaces were proven to hold the witness points to last digits"
-
-    def __new__(cls, value: int, meaning: str):
-        member = int.__new__(cls, value)
-        member._value_ = value
-        member.meaning = member.__doc__ = meaning
-        return member
-
-    def __str__(self) -> str:
-        return self.name.lower().replace("_", " ")
-
-    def __format__(self, spec: str) -> str:
-        return format(str(self), spec)

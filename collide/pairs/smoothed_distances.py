@@ -26,6 +26,7 @@ from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument
 from collide.pairs.pair_arguments import pose_batch
 from collide.pairs.query import distance
+from collide.transforms import rotation_from_unit
 
 if TYPE_CHECKING:
     from collide.transforms import PoseLike
@@ -125,12 +126,10 @@ def smoothed_distances(
 
 
 def rotations(phi: np.ndarray) -> np.ndarray:
-    """(n, 3, 3) exp(φ) of (n, 3) [rad], after Rodrigues."""
-    theta = np.linalg.norm(phi, axis=1)[:, None, None]
-    cross = np.cross(np.eye(3), phi[:, None, :])  # row i is e × φ: times x, φ × x
-    a = np.sinc(theta / np.pi)
-    b = 0.5 * np.sinc(0.5 * theta / np.pi) ** 2
-    return np.eye(3) + a * cross + b * (cross @ cross)
+    """(n, 3, 3) exp(φ) of (n, 3) [rad], by the unit quaternion of half the angle."""
+    half = 0.5 * np.linalg.norm(phi, axis=1)
+    xyz = 0.5 * np.sinc(half / np.pi)[:, None] * phi
+    return np.moveaxis(rotation_from_unit(np.cos(half), *xyz.T), -1, 0)
 
 
 def _scores(motions: np.ndarray, R_WB: np.ndarray, sigma: float, tau: float) -> np.ndarray:

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 import numpy as np
 
 from collide.base import argument_checks as checks
-from collide.base.foreign_arguments import foreign_arguments
-from collide.base.foreign_names import advice_on_shape
+from collide.base.foreign_arguments import foreign_arguments, foreign_names
 from collide.base.lazy_modules import lazy_module
 from collide.base.log import log_duration
 from collide.errors import InvalidShape
@@ -478,7 +477,7 @@ def _vertices_and_faces(mesh) -> tuple[ArrayLike, ArrayLike]:
     except AttributeError:
         raise InvalidShape(
             f"Mesh: give vertices (n, 3) and faces (m, 3), or an object that has both, got {checks.brief(mesh)} and "
-            f"faces None{advice_on_shape(mesh)}"
+            f"faces None{foreign_names.advice_on_shape(mesh)}"
         ) from None
 
 

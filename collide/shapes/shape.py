@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from collide.base import argument_checks as checks
-from collide.base.foreign_names import advice_on_shape
+from collide.base.foreign_arguments import foreign_names
 from collide.base.fork_safe_lock import ForkSafeLock
 from collide.base.lazy_modules import lazy_module
 from collide.errors import InvalidArgument, InvalidShape, brief
@@ -297,7 +297,7 @@ def scalar(shape: str, field: str, value: Any) -> float:
 def checked_shape(what: str, value: Any, example: str = "collide.Box((1, 1, 1))") -> Shape:
     """A shape. what : "raycast: shape", for messages.   Raises InvalidArgument."""
     if not isinstance(value, Shape):
-        advice = advice_on_shape(value)
+        advice = foreign_names.advice_on_shape(value)
         raise InvalidArgument(f"{what} must be a shape, for example {example}, got {brief(value)}{advice}")
     return value
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from collide.base.notebook_html import GREY, MAX_ROWS, page_of
+from collide.base.notebook_html import page_of
 from collide.errors import UnsupportedQuery
 from collide.shapes.shape import IDENTITY, Shape
 from collide.shapes.tessellation import tessellate
@@ -20,8 +20,7 @@ _ALONE = 2.0
 
 def shape_html(shape: Shape) -> str:
     """A shape as HTML: its repr and a picture."""
-    triangles = _placed([(shape, IDENTITY)])
-    return page_of(repr(shape), triangles, np.tile(GREY, (len(triangles), 1)), (), ())
+    return page_of(repr(shape), triangles=_placed([(shape, IDENTITY)]))
 
 
 def bodies_html(title: str, bodies: Sequence[Any], n_bodies: int) -> str:
@@ -30,9 +29,8 @@ def bodies_html(title: str, bodies: Sequence[Any], n_bodies: int) -> str:
     bodies : with ``name``, ``shape``, ``X_WB`` and ``static``, the first of ``n_bodies``.
     """
     head = ("body", "shape", "x y z [m]", "")
-    rows = [_row(body) for body in bodies[:MAX_ROWS]] + [()] * max(0, n_bodies - MAX_ROWS)
     triangles = _placed([(body.shape, body.X_WB) for body in bodies[:MAX_DRAWN]])
-    return page_of(title, triangles, np.tile(GREY, (len(triangles), 1)), head, rows)
+    return page_of(title, head, map(_row, bodies), n_bodies, triangles)
 
 
 def _row(body: Any) -> tuple[str, str, str, str]:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from collide.base import argument_checks as checks
-from collide.base.array_libraries import library_of, to_library
+from collide.base.array_libraries import ToLibrary, library_of, to_library
 from collide.base.threads import check_threads, share
 from collide.broadphase.bounding_boxes import widened
 from collide.broadphase.pairs_in_worlds import NearPairs
@@ -216,7 +216,7 @@ class WorldBatch:
         return WorldBatchResult(rows, starts, self._packed.roster, self._packed.X_WBs, self._moving, X_WBs.copy())
 
 
-class WorldBatchResult:
+class WorldBatchResult(ToLibrary):
     """Rows of a question about N worlds, world after world, with the bodies as they stood.
 
     Parameters
@@ -242,23 +242,6 @@ class WorldBatchResult:
     def world(self) -> np.ndarray:
         """(k,) int64, the number of the world of each row."""
         return np.repeat(np.arange(len(self)), np.diff(self.starts))
-
-    def to(self, like: Any) -> Any:
-        """The same rows with columns as arrays of PyTorch or JAX (`collide.to_library`).
-
-        Parameters
-        ----------
-        like : "numpy", "torch", "jax", or an array of one of these libraries.
-
-        Returns
-        -------
-        An object with the same columns and worlds.
-
-        Raises
-        ------
-        InvalidArgument, MissingExtra
-        """
-        return to_library(self, like)
 
     def __len__(self) -> int:
         return len(self.starts) - 1
