@@ -62,6 +62,7 @@ def ours(code: str, names: dict | None = None):
     return json.loads(printed[-1])
 
 
+@pytest.mark.slow
 def test_signed_distance_of_concentric_balls():
     code = "print(json.dumps(fcl.distance(at(fcl.Sphere(0.5), 0, 0, 0), at(fcl.Sphere(0.25), 0, 0, 0), signed)))"
     assert theirs(code, 2.5) == (None, None)

@@ -72,6 +72,7 @@ def told(casts: collide.casts.shape_cast.ShapeCasts) -> np.ndarray:
     return row
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("start_normals", [False, True])
 def test_single_calls_have_pythons_bits(integers, start_normals):
     asker, counts = c.Asker(), {"hit": 0, "at_start": 0, "miss": 0, "refused": 0, "open": 0}

@@ -126,6 +126,7 @@ def test_library_exports_its_headers_and_nothing_else():
     assert set(c._TYPES) <= set(declared), "the tests call what the header does not have"
 
 
+@pytest.mark.slow
 def test_examples_are_built_by_make_and_run(tmp_path):
     """As a reader builds them, with nothing of Python's in the environment."""
     for tool in ("make", "pkg-config", "cc", "c++"):
@@ -169,6 +170,7 @@ def test_the_page_says_what_runs(tmp_path):
     assert run(built(tmp_path, text)).split() == ["1.25", "0"]
 
 
+@pytest.mark.slow
 def test_memory_that_runs_out_changes_no_world(tmp_path):
     """Each allocation of changes and of questions fails once: that is told, and the call can be made again."""
     if not sys.platform.startswith("linux"):

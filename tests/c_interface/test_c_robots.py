@@ -154,6 +154,7 @@ def mesh_shape(rng, size: float) -> collide.Shape:
     return random_link_shape(rng, size)
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("seed", [0, 1, 3])
 def test_robots_with_meshes_have_pythons_bits(seed, tmp_path):
     """Meshes on links and around: booleans and motions; distances of meshes are left to Python."""
@@ -170,6 +171,7 @@ def test_robots_with_meshes_have_pythons_bits(seed, tmp_path):
     assert told["edges 2"] > 10, told
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("form", ["spheres", "hulls", "meshes"])
 @pytest.mark.parametrize("name", ["panda", "ur5"])
 def test_arms_have_pythons_bits(name, form, tmp_path):
@@ -297,6 +299,7 @@ def scene_that_moves(form: str, rng) -> collide.RobotChecker:
     return checker
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("form", ["hulls", "spheres", "meshes"])
 def test_bodies_moved_in_c_have_pythons_bits(form, tmp_path):
     """After every move C has the bits of the checker whose World moves, and the booleans of a checker made anew."""
@@ -557,6 +560,7 @@ def survivors(path: str, first: int, n: int) -> dict[str, list[int]]:
     return told
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("form", ["hulls", "spheres", "meshes"])
 def test_files_that_lie_are_refused_or_harmless(form, tmp_path):
     """Of 600 files with a word replaced and a digest that fits, each is refused or answers something; none ends the

@@ -571,6 +571,7 @@ int main() {
 """
 
 
+@pytest.mark.slow
 def test_poses_are_made_of_eigens(tmp_path):
     if EIGEN is None:
         pytest.skip("no Eigen on this machine: apt-get install libeigen3-dev")

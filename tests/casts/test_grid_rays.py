@@ -123,6 +123,7 @@ def test_rays_meet_the_surface_of_the_union(seed):
     assert 0.4 * asked < inside < 0.95 * asked and passed > 0.1 * asked, (asked, inside, passed)
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("seed", range(2))
 def test_rays_through_edges_and_along_faces(seed):
     """Multiples of an eighth, or next to them: all ends of stretches are met, and nothing inside the union; as of one

@@ -148,7 +148,7 @@ def judge(rng, field, B, X, Y, seen: Counter) -> None:
             seen["taken" if proves else "refused"] += 1
 
 
-@pytest.mark.many(4)
+@pytest.mark.many(16)
 @pytest.mark.parametrize("seed", range(12))
 def test_terrain_is_proven_and_forgeries_are_refused(large_fields, blocks, seed):
     rng, seen = np.random.default_rng([21, seed]), Counter()
@@ -157,7 +157,7 @@ def test_terrain_is_proven_and_forgeries_are_refused(large_fields, blocks, seed)
     assert seen["hit"] and seen["gap"] and seen["refused"] > 170 and seen["taken"] > 5, seen
 
 
-@pytest.mark.many(4)
+@pytest.mark.many(12)
 @pytest.mark.parametrize("seed", range(24))
 def test_swept_meshes_are_proven_and_forgeries_are_refused(seed):
     rng, seen = np.random.default_rng([22, seed]), Counter()
@@ -179,6 +179,7 @@ def certified(field, B, X, Y, *, hit: bool) -> list:
     return proof
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("steep", [0.0, 0.5])
 def test_flush_bodies(large_fields, blocks, steep):
     """A wedge on a slope: in touch a hit, an ulp above a gap with few planes."""

@@ -62,6 +62,7 @@ LINKED = collide.pose((1, 0.02, 0.01), rpy=(np.pi / 2, 0.1, 0))
 THROUGH = collide.pose((0.05, 0, 0), rpy=(0.1, 0.05, 0))
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("B, X_WB", [
     (torus(1.0, 0.3, 20, 12), LINKED), (collide.Cylinder(0.5, 3), THROUGH), (collide.Ellipsoid((0.5, 0.5, 3)), THROUGH),
     (collide.Capsule(0.5, 3), THROUGH),

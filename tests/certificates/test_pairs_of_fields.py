@@ -45,6 +45,7 @@ def bodies(rng) -> list:
     ]
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("kind", ["cloud", "terrain", "swept"])
 def test_every_decided_answer_has_a_certificate(kind):
     rng, seen = rng_of(f"curved bodies and fields {kind}"), Counter()

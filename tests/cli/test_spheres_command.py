@@ -104,6 +104,7 @@ def test_an_audit_tells_what_is_outside(robot, tmp_path, capsys):
     assert not audit["encloses"] and audit["audited"] == "published.urdf"
 
 
+@pytest.mark.slow
 def test_pieces_of_any_convex_shapes_are_audited(robot, tmp_path, capsys):
     """A robot against itself is contained; a smaller box in the place of the base's shapes is not, by half of what it
     lacks along the box, and a mesh that is not convex enters as its hull.

@@ -308,6 +308,7 @@ def test_the_point_of_a_speck_beside_a_far_corner_lies_on_the_speck():
         assert np.abs(row["point_b"] - row["point_a"] - row["distance"] * row["normal"]).max() <= 1e-15
 
 
+@pytest.mark.many(4)
 @pytest.mark.parametrize("solid", [False, True])
 @pytest.mark.parametrize("margin", [0.0, 1e-3, 0.05, 0.4])
 def test_what_is_beyond_the_margin_is_left_out_and_nothing_else(margin, solid, monkeypatch):

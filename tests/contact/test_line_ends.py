@@ -92,7 +92,7 @@ TARGETS = {
 }
 
 
-@pytest.mark.many(2)
+@pytest.mark.many(14)
 @pytest.mark.parametrize("body", LINED)
 @pytest.mark.parametrize("target", TARGETS)
 def test_a_line_along_a_rim_or_a_sharp_edge_has_both_ends(target, body):
@@ -169,6 +169,7 @@ def lines_along(number: int):
     return (a, b), A, B, X_WA, X_WB, margin
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("part", range(4))
 def test_points_of_lines_that_lean_are_on_their_bodies(part):
     """An end was past that of a cylinder that leaned, by what the side falls off beside its line times the sine. Two

@@ -151,6 +151,7 @@ def test_of_facets_within_some_are_asked(solid, asked):
         assert asked["meets"] <= 2 * (n_within + n_crossing), (seed, asked, n_within, n_crossing)
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("solid", [True, False])
 def test_rows_of_fine_meshes_are_what_they_promise(solid):
     seen: Counter = Counter()

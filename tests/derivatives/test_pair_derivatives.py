@@ -66,7 +66,7 @@ def test_gradients_are_slopes_of_exact_distances(pair):
         judge(A, B, X_WA[k], X_WB[k], gradient_of(r[int(k)]), rng)
 
 
-@pytest.mark.many(3)
+@pytest.mark.many(9)
 @pytest.mark.parametrize("distance", [1e-6, 1e-4, -1e-7, -1e-3])
 @pytest.mark.parametrize("pair", [p for p in PAIRS if "half-space" not in p and "point" not in p], ids="-".join)
 def test_gradients_of_bodies_that_all_but_touch(pair, distance):

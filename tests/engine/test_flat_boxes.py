@@ -23,6 +23,7 @@ def aligned_signed_distance(size_a, size_b, t) -> float:
     return -float(over.min()) if (over >= 0.0).all() else float(np.linalg.norm(np.minimum(over, 0.0)))
 
 
+@pytest.mark.many(4)
 @pytest.mark.parametrize("size", SIZES)
 def test_boxes_with_parallel_edges(size):
     rng, seen, flat = rng_of("flat", size), [0, 0, 0], collide.Box(size)

@@ -113,14 +113,15 @@ def test_normals_points_and_margins_beside_rounding(seed):
     assert apart > 11 and within > 33 and beyond > 22
 
 
-@pytest.mark.many(2)
+@pytest.mark.many(8)
+@pytest.mark.parametrize("part", range(4))
 @pytest.mark.parametrize("kind", ("Cylinder", "Cone"))
-def test_booleans_and_distances_never_contradict_each_other(kind):
+def test_booleans_and_distances_never_contradict_each_other(kind, part):
     """Hulls of 166 points all but touching round shapes: of some 2 pairs in 100, one search proved what the other
     left open."""
-    rng = naive.rng_of("one answer", kind)
+    rng = naive.rng_of("one answer", kind, part)
     contradictions, decided = [], 0
-    for _ in range(40):
+    for _ in range(10):
         points = rng.normal(size=(166, 3))
         points *= np.exp(rng.uniform(np.log(0.2), np.log(3.0))) / np.linalg.norm(points, axis=1)[
             :, None
@@ -146,7 +147,7 @@ def test_booleans_and_distances_never_contradict_each_other(kind):
         world.add(B, X_WBs[k])
         assert world.collides() == hits[k] == bool(len(world.collisions()))
     assert not contradictions, contradictions[0]
-    assert decided == 2000
+    assert decided == 500
 
 
 def test_what_a_boolean_proves_a_distance_knows():

@@ -62,6 +62,7 @@ def test_balls_beside_distances_of_points_from_triangles(name):
     assert 3 <= hits <= 21, hits
 
 
+@pytest.mark.many(4)
 @pytest.mark.parametrize(
     "kind", [*one_of_each(rng_of("kinds")), "Mesh", "SweptMesh", "PointCloud", "Plane", "flat Box"]
 )

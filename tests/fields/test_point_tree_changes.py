@@ -93,6 +93,7 @@ def answers(cloud, rng) -> tuple:
     return told, sum(int(state.sum()) for state in met)
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("radii", ["one", "each"])
 @pytest.mark.parametrize("seed", range(2))
 def test_chains_of_changes_keep_the_tree_whole_and_answers_as_they_are_anew(seed, radii):

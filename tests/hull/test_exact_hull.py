@@ -320,6 +320,7 @@ def test_larger_clouds():
         check_supports(rng, points, hull)
 
 
+@pytest.mark.slow
 def test_a_crowd_over_a_ring():
     """Wide fans over many points, and more tests than a hull should take: both ways out are taken."""
     t = np.linspace(0, 1, 600)

@@ -118,6 +118,7 @@ def test_steps(kind):
     assert seen["steps"] > 15, seen
 
 
+@pytest.mark.slow
 def test_wide_fans_are_searched_by_halving():
     """The facet that `locate` finds is one that the point is above, if it is above any of the fan."""
     rng = rng_of("locate")

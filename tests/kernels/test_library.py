@@ -184,34 +184,35 @@ def test_a_package_that_cannot_be_written_is_used(site, ask):
 # --- not as the build left it -----------------------------------------------------------------------
 
 
-def harms(length: int) -> dict:
-    """Ways to spoil a file's bytes."""
-    rng = rng_of("damaged library")
-
-    def flipped(content: bytes) -> bytes:
-        at = int(rng.integers(length))
-        return content[:at] + bytes([content[at] ^ 1 << int(rng.integers(8))]) + content[at + 1 :]
-
-    return {
-        "empty": lambda content: b"", "cut in half": lambda content: content[: length // 2],
-        "one byte short": lambda content: content[:-1], "longer": lambda content: content + b"\0",
-        "a bit flipped": flipped, "another bit flipped": flipped,
-        "its head flipped": lambda content: b"\x7eELF" + content[4:],
-    }
+def flipped(content: bytes, seed: str) -> bytes:
+    rng = rng_of("damaged library", seed)
+    at = int(rng.integers(len(content)))
+    return content[:at] + bytes([content[at] ^ 1 << int(rng.integers(8))]) + content[at + 1 :]
 
 
-@pytest.mark.many(2)
+#: Ways to spoil a file's bytes.
+HARMS = {
+    "a bit flipped": lambda content: flipped(content, "first"),
+    "another bit flipped": lambda content: flipped(content, "second"),
+    "cut in half": lambda content: content[: len(content) // 2], "empty": lambda content: b"",
+    "its head flipped": lambda content: b"\x7eELF" + content[4:], "longer": lambda content: content + b"\0",
+    "one byte short": lambda content: content[:-1],
+}
+
+
+@pytest.mark.many(5)
 @pytest.mark.parametrize("of", ["library", "module"])
-def test_what_is_damaged_is_not_loaded(site, ask, of):
+@pytest.mark.parametrize("harm", HARMS)
+def test_what_is_damaged_is_not_loaded(site, ask, of, harm):
     file = library_of(site) if of == "library" else glue_of(site)
     content = file.read_bytes()
-    for harm, spoil in harms(len(content)).items():
-        assert spoil(content) != content
-        rewritten(file, spoil(content))
-        told, said = ask()
-        assert told["mode"] == "just in time" and told["box"] == RIGHT, harm
-        assert "damaged" in said, "it is said in every process, also where kernels come from the disk"
-        assert "damaged" in told["why"] and str(file) in told["why"] and "install" in told["why"], (harm, told["why"])
+    spoilt = HARMS[harm](content)
+    assert spoilt != content
+    rewritten(file, spoilt)
+    told, said = ask()
+    assert told["mode"] == "just in time" and told["box"] == RIGHT
+    assert "damaged" in said, "it is said in every process, also where kernels come from the disk"
+    assert "damaged" in told["why"] and str(file) in told["why"] and "install" in told["why"], told["why"]
     rewritten(file, content)
     assert ask()[0]["mode"] == "compiled"
 
@@ -259,6 +260,7 @@ def test_an_edited_kernel_answers_as_it_is_written_now_and_the_library_serves_th
     assert ask()[0]["mode"] == "compiled"
 
 
+@pytest.mark.slow
 def test_a_new_entry_is_compiled_and_the_library_serves_the_others(site, ask):
     with open(site / "collide" / "broadphase" / "bounding_boxes.py", "a", encoding="utf-8") as file:
         file.write("\n\n@entry('int64()')\ndef answer_of_all():\n    return 42\n")
@@ -266,7 +268,7 @@ def test_a_new_entry_is_compiled_and_the_library_serves_the_others(site, ask):
     assert told["mode"] == "just in time" and told["edited"] == ["answer_of_all"] and told["box"] == RIGHT
 
 
-@pytest.mark.many(2)
+@pytest.mark.slow
 @pytest.mark.parametrize("edit", ["docstrings", "comments and lines"])
 def test_words_in_every_source_keep_the_library(site, ask, edit):
     from collide.kernels import sources
@@ -316,7 +318,7 @@ def test_the_library_needs_no_numba(ask, no_numba):
     assert told["mode"] == "compiled" and told["box"] == RIGHT and said == ""
 
 
-@pytest.mark.many(2)
+@pytest.mark.many(6)
 @pytest.mark.parametrize("harm", ["damaged", "missing", "other sources"])
 def test_without_library_and_numba_it_is_said_what_to_do(site, no_numba, harm):
     if harm == "damaged":

@@ -32,6 +32,7 @@ def test_the_list_holds_what_defines_kernels_and_what_these_see(copy):
     assert 80 < len(names) < 380 and sum(os.path.getsize(copy / name) for name in names) < 3e6
 
 
+@pytest.mark.slow
 def test_the_checksum_changes_with_every_source_of_kernels_and_with_nothing_else(copy):
     names = sources.kernel_sources()
     first, changed = sources.fingerprint(names), []
@@ -130,7 +131,7 @@ def changed_by(hashes, file: Path, old: str, new: str) -> set[str]:
     return {name for name in UNEDITED if UNEDITED[name] != after[name]}
 
 
-@pytest.mark.many(2)
+@pytest.mark.many(6)
 @pytest.mark.many(2)
 @pytest.mark.parametrize(
     ("name", "old", "new", "stale", "fresh"),
@@ -194,6 +195,7 @@ print(json.dumps([count, missing]))
 """
 
 
+@pytest.mark.slow
 def test_every_function_that_python_finds_from_an_entry_is_in_its_hash():
     """Read from the sources alone, the hash must see what Python's own look-up of names sees."""
     done = child(["-c", REACHED], environment(PACKAGE.parent, NUMBA_DISABLE_JIT="1"))

@@ -111,6 +111,7 @@ def test_pizza_boxes_take_logarithmically_many_facets():
     assert len(made.mesh.faces) > 400, "the largest one is cut"
 
 
+@pytest.mark.slow
 def test_random_boxes_and_prisms():
     rng = rng_of("localised")
     cut = exact = 0

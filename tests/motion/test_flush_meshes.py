@@ -10,6 +10,7 @@ import functools
 from fractions import Fraction
 
 import numpy as np
+import pytest
 from motions import l_mesh
 
 import collide
@@ -100,6 +101,7 @@ def random_flight(rng) -> tuple[np.ndarray, np.ndarray]:
     return (p0, p1) if rng.uniform() < 0.5 else (-p0, -p1)
 
 
+@pytest.mark.slow
 def test_unions_of_cubes_in_fractions():
     rng = np.random.default_rng(31)
     n_flush = n_free = n_open = 0
@@ -211,6 +213,7 @@ def test_open_meshes():
     assert r.hit and 0.4 - 1e-12 <= r.lower <= 0.4 <= r.upper
 
 
+@pytest.mark.slow
 def test_bits_are_the_same_swapped_and_in_batches():
     rng, n = np.random.default_rng(34), 10
     A, B, n_proven = mesh_of(L), mesh_of(CORNER), 0

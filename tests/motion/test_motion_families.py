@@ -33,7 +33,7 @@ def snippet(family: str, seed: list[int], k: int, r) -> str:
     )
 
 
-@pytest.mark.many(14)
+@pytest.mark.many(28)
 @pytest.mark.parametrize("family", list(motions.FAMILIES))
 def test_no_contact_is_missed_and_none_is_made_up(family):
     n_hits = n_free = n_open = 0

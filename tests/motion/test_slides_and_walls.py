@@ -248,6 +248,7 @@ def question(case: Case) -> str:
     return f"{case.family}: {case.A.kind} {case.A.boxes.tolist()!r}, {case.B.kind} {case.B.boxes.tolist()!r}, {poses}"
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("part", range(3))
 def test_no_contact_is_missed_late_or_made_up(part):
     seen: Counter = Counter()

@@ -46,6 +46,7 @@ def apart_along(A, B, X_WA, X_WB, nhat) -> float:
     return float(-(a.support(n) + b.support(-n)))
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("part", range(4))
 def test_bodies_are_as_far_apart_along_the_normal_as_proven(part):
     """The direction of the nearest point of A ⊖ B leaned by its rounding over its length: along it bodies 1e-9 apart

@@ -78,7 +78,7 @@ def offset_near(rng, intervals) -> float:
     return end if kind == 2 else float(np.nextafter(end, rng.choice((-np.inf, np.inf))))
 
 
-@pytest.mark.many(3)
+@pytest.mark.many(9)
 @pytest.mark.parametrize("seed", range(9))
 def test_planes_and_half_spaces_beside_fractions(seed, monkeypatch):
     monkeypatch.setattr(terrain_columns, "_MAX_LEVEL", 2)

@@ -114,6 +114,7 @@ def _folder_files() -> set[str]:
 # --- the wheel ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_wheel_holds_the_folders_and_nothing_else(wheel):
     installed = {name for name in wheel.namelist() if ".dist-info/" not in name and not MADE.fullmatch(name)}
     missing, extra = sorted(_folder_files() - installed), sorted(installed - _folder_files())
@@ -193,6 +194,7 @@ def without_compilers(tmp_path) -> dict[str, str]:
     return {"CC": str(tmp_path / "no-such-compiler"), "PYTHONPATH": str(tmp_path)}
 
 
+@pytest.mark.slow
 def test_without_a_compiler_the_wheel_needs_numba_and_says_so(tmp_path, without_compilers):
     done = _built(tmp_path / "tree", **without_compilers)
     assert done.returncode == 0, done.stdout + done.stderr

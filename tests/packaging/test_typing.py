@@ -80,6 +80,7 @@ def checked(tmp_path_factory):
     return done.stdout.splitlines()
 
 
+@pytest.mark.slow
 def test_a_right_program_is_clean(checked):
     assert not [line for line in checked if line.startswith("right.py")]
 

@@ -65,6 +65,7 @@ def test_a_ball_under_the_top_of_an_l_comes_out_of_the_top():
     assert r.distance == pytest.approx(-0.15, abs=1e-12) and np.array_equal(r.normal, (0, 0, 1))
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("centre", [(0, 0, 0), (0.2, 0.1, 0.05), (0.5, 0.3, 0.4)])
 @pytest.mark.parametrize(("spacing", "radius"), [(0.8, 0.6), (0.5, 0.5)])
 def test_27_balls_are_left_where_three_spheres_meet(spacing, radius, centre):

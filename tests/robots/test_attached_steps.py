@@ -151,6 +151,7 @@ def told(checker: collide.RobotChecker, Q: np.ndarray, is_short: bool) -> dict:
     }
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("padding", [0.0, 0.01])
 @pytest.mark.parametrize(("kind", "n_steps"), [
     ("spheres", 40), ("hulls", 40), *(pytest.param(kind, 300, marks=pytest.mark.slow) for kind in KINDS)])

@@ -59,6 +59,7 @@ def setting_of(seed: int):
     return rng, checker, Q[~checker.collides(Q)][:8]
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("seed", range(12))
 def test_free_times_of_splines_have_no_sample_that_collides_and_collisions_do(seed):
     rng, checker, Q = setting_of(seed)
@@ -126,6 +127,7 @@ def test_a_graze_at_one_instant_is_between_all_samples_and_not_free():
 # --- bounds ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("seed", range(10))
 def test_bounds_of_curves_and_cells_hold_for_points_of_all_bodies(seed):
     """Corners of bodies against where they are in the middle, robots with planar, floating and mimicking joints."""

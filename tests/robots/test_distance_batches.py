@@ -133,6 +133,7 @@ def test_rows_of_a_configuration_are_sorted_and_named_by_starts():
     assert measured.starts[-1] == len(measured) and len(measured.starts) == len(Q) + 1
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("scene", [hollow_scene, convex_scene])
 @pytest.mark.parametrize("between", BETWEEN)
 def test_rows_of_links_and_robots_are_the_least_of_pairs(scene, between):
@@ -248,6 +249,7 @@ def test_slots_grow_and_a_batch_goes_on_where_these_were_full(monkeypatch):
         assert measured.gradient.tobytes() == expected.gradient.tobytes()
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("per", ["robot", "link", "pair"])
 def test_threads_and_empty_batches(per, monkeypatch):
     monkeypatch.setattr("collide.robots.checker_scene._LEAST_PIECE", 8)

@@ -128,6 +128,7 @@ def test_what_has_not_changed_is_taken_over():
     assert checker.prepare().allowed is not before.allowed
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("seed", range(12))
 def test_workspaces_follow_bodies_that_move(seed):
     """Without margins nothing is made anew; each of three moves, a cloud's and a turned union's as well, is answered as

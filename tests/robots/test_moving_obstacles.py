@@ -65,6 +65,7 @@ class Setting:
         return bool(self.stands.collides(spline(t)))
 
 
+@pytest.mark.many(4)
 @pytest.mark.parametrize("seed", range(16))
 def test_free_times_have_no_sample_that_collides_and_told_times_do(seed):
     setting = Setting(seed)

@@ -41,6 +41,7 @@ def test_no_shape_outlives_its_last_user_and_memory_stays(monkeypatch):
     assert blocks[-1] - blocks[len(blocks) // 2] <= MOST_BLOCKS * SHAPES / 2, blocks
 
 
+@pytest.mark.slow
 def test_all_kinds_and_uses_are_drawn(monkeypatch):
     drawn: collections.Counter = collections.Counter()
     make = soak_memory.shape
@@ -50,6 +51,7 @@ def test_all_kinds_and_uses_are_drawn(monkeypatch):
     assert set(drawn) == {*WORLD_KINDS, *USES} and min(drawn.values()) >= 10
 
 
+@pytest.mark.slow
 def test_a_pair_that_holds_its_shapes_is_noticed(monkeypatch):
     kept = []
 

@@ -159,6 +159,7 @@ def test_crossings_of_facets_of_three_bodies_are_cut_in_kernels(monkeypatch):
     assert len(quick.mesh.faces) == len(slow.mesh.faces) and quick.moved <= slow.moved
 
 
+@pytest.mark.slow
 def test_crossings_in_an_unproven_order_along_a_segment():
     """Their pieces once said in which direction they run, and the sheets around them were put in a wrong order."""
     v = judge_many("turned grid shells", 15, 4, 16)

@@ -135,7 +135,7 @@ def left_out(points, centers: np.ndarray, radii: np.ndarray) -> list:
 
 @pytest.mark.parametrize("count", [1, 7])
 @pytest.mark.parametrize("name", SOLIDS)
-@pytest.mark.many(3)
+@pytest.mark.many(12)
 def test_every_point_of_a_body_is_in_a_ball(name, count):
     shape, rng = SOLIDS[name], rng_of(name, count)
     spheres = collide.enclosing_spheres(shape, count)
@@ -163,6 +163,7 @@ def test_excess_of_a_box_is_in_its_bracket():
         assert away <= upper * (1 + 1e-12) and upper - lower < 1e-9 and away > 0.99 * lower
 
 
+@pytest.mark.slow
 def test_excess_of_a_mesh_is_in_its_bracket():
     mesh, rng = collide.Mesh(*block_ring()), rng_of("excess of a mesh")
     spheres = collide.enclosing_spheres(mesh, 8)
@@ -177,6 +178,7 @@ def test_excess_of_a_mesh_is_in_its_bracket():
     assert away <= upper and lower <= upper <= 1.05 * lower and away > 0.7 * lower
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("name", ["box", "capsule", "ring", "hull"])
 def test_an_excess_asked_for_is_kept(name):
     shape = SOLIDS[name]
@@ -188,6 +190,7 @@ def test_an_excess_asked_for_is_kept(name):
         spheres.verify(shape)
 
 
+@pytest.mark.slow
 def test_more_spheres_exceed_less():
     shape = SOLIDS["bumps"]
     upper = [collide.enclosing_spheres(shape, count).excess[1] for count in (1, 3, 8, 20)]
@@ -234,7 +237,7 @@ def refused(spheres, shape, match: str) -> None:
         spheres.verify(shape)
 
 
-@pytest.mark.many(2)
+@pytest.mark.many(4)
 @pytest.mark.parametrize("name", ["ring", "box", "capsule", "open"])
 def test_forged_covers_are_refused(name):
     shape = SOLIDS[name]
@@ -279,6 +282,7 @@ def test_facets_around_a_part_must_be_around_it():
     refused(spheres._replace(certificate=(cover._replace(vertices=None),)), shape, "no facets around")
 
 
+@pytest.mark.slow
 def test_a_hole_inside_is_no_cover():
     """Balls along the surface of a cube cover its facets, and leave out its middle: of a solid no proof."""
     v, f = box()

@@ -174,7 +174,7 @@ def of_facets(mesh: collide.Mesh, n: int, rng) -> np.ndarray:
 
 
 @pytest.mark.parametrize("case", range(6))
-@pytest.mark.many(3)
+@pytest.mark.many(6)
 def test_points_keep_within_the_brackets(case):
     """Random boxes and tetrahedra beside random meshes: no point is farther than an upper bound, and points drawn where
     bounds say are nearly as far as the lower.

@@ -30,6 +30,7 @@ def test_a_ball_inside_a_cube_leaves_known_parts_outside():
     assert 0.5 * np.linalg.norm(drawn, axis=1).sum() == pytest.approx(share * 24.0, rel=0.02)
 
 
+@pytest.mark.slow
 def test_spheres_that_enclose_are_known_to():
     for name, shape in {
         "ring": collide.Mesh(*block_ring()), "capsule": collide.Capsule(0.1, 1.0),

@@ -109,6 +109,7 @@ def quick_switches():
     sys.setswitchinterval(before)
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("change", CHANGES)
 def test_four_readers_see_one_state_or_the_other(change, quick_switches):
     world = world_of()

@@ -73,6 +73,7 @@ def differing(one: collide.World, other: collide.World) -> list[str]:
 # --- add_many -----------------------------------------------------------------------------------
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("seed", range(4))
 def test_added_at_once_or_one_by_one_answers_are_the_same_bytes(seed):
     """Into empty Worlds and into those that were asked and lost bodies, with traits as lists or as arrays."""

@@ -105,6 +105,7 @@ def snippet(A, B, X, Y) -> str:
     return f"A, B = {A!r}, {B!r}\nX_WA = {X.tolist()}\nX_WB = {Y.tolist()}"
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("poser", [any_pose, lattice_pose])
 def test_unions_answer_as_all_pairs_of_parts_do(poser):
     """Turned any way, poses of parts are rounded products; by right angles they are exact, and much touches."""

@@ -126,6 +126,7 @@ def block(x: float, y: float, z: float) -> collide.Mesh:
     return collide.Mesh(*collide.tessellate(collide.Box((x, y, z)))[:2])
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize(
     "can", [collide.Cylinder(0.2, 0.4), collide.Cone(0.2, 0.4), collide.Ellipsoid((0.2, 0.2, 0.2))], ids=repr
 )

@@ -210,6 +210,7 @@ def test_groups_hold_their_parts():
     assert checked > 3000
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("limit", [0.05, 3e3, np.inf])
 @pytest.mark.parametrize("swapped", [False, True])
 def test_parts_of_a_union_before_a_large_convex_body_are_told_apart_by_sets(monkeypatch, limit, swapped):

@@ -20,7 +20,7 @@ from collide.narrowphase.exact.exact_supports import support_pair
 pytestmark = pytest.mark.plain_kernels
 
 
-@pytest.mark.many(2)
+@pytest.mark.many(4)
 @pytest.mark.parametrize("kind", ["any", "lattice", "far apart in size", "composed"])
 def test_support_pairs(kind):
     """The last vertices against a direction, exactly, and the first ones of equals: planted ties on lattices."""

@@ -88,6 +88,7 @@ def begun(bodies: PosedBodies, rng, tries: int) -> list[int]:
     return [k for pair in min(triples, key=distance) for k in pair] + [0] * 10
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("draw", KINDS, ids=lambda draw: draw.__name__)
 def test_the_same_search_as_in_integers(draw):
     rng = rng_of("filtered", draw.__name__)

@@ -63,7 +63,7 @@ def surface_requests(bodies: ExactBodies) -> list[int]:
     return [complete, len(facets), *(k for _, facet in facets for corner in facet for k in names[corner])]
 
 
-@pytest.mark.many(2)
+@pytest.mark.many(4)
 @pytest.mark.parametrize("kind", ["rounding", "touching", "any"])
 def test_nearest_planes(kind):
     rng = rng_of("nearest plane", kind)

@@ -45,7 +45,7 @@ def test_surfaces_that_share_a_point_touch(seed):
     assert exact >= 0.9 * EACH
 
 
-@pytest.mark.many(4)
+@pytest.mark.many(12)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_an_ulp_beside_a_touch_is_told(seed):
     rng = np.random.default_rng([47, seed])

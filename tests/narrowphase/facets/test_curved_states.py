@@ -31,6 +31,7 @@ def meets_by_facets(mesh, shape, X_WA, X_WB) -> bool:
     return bool(hits.any()) or (mesh.solid and collide.collide(mesh, collide.Sphere(1e-9), X_WA, collide.pose(centre)))
 
 
+@pytest.mark.many(4)
 @pytest.mark.parametrize("solid", [False, True])
 @pytest.mark.parametrize("name", SHAPES)
 @sizes(24, 400)

@@ -56,6 +56,7 @@ def no_long_way(monkeypatch):
     monkeypatch.setattr(query, "answer_batch", refuse)
 
 
+@pytest.mark.many(4)
 @pytest.mark.parametrize("name", PARTNERS)
 @pytest.mark.parametrize("shared", [None, "X_WA", "X_WB"])
 def test_batches_have_the_bytes_of_the_long_way_and_of_single_calls(name, shared):

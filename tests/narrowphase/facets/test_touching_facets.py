@@ -31,6 +31,7 @@ def swept(name: str, rng):
     return collide.ConvexHull(rng.normal(size=(3, 3)), radius=rng.uniform(0.1, 0.5))
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("kind", ["sphere", "capsule", "rounded"])
 @pytest.mark.parametrize("mesh", ["box", "hull", "L"])
 def test_touching_is_decided(mesh, kind):
@@ -58,7 +59,7 @@ def test_touching_is_decided(mesh, kind):
 
 @pytest.mark.parametrize("kind", OTHERS)
 @pytest.mark.parametrize("how", ["plain", "swept", "in unions", "swept beside unions"])
-@pytest.mark.many(2)
+@pytest.mark.many(8)
 def test_resting_bodies_are_decided(kind, how):
     """Touching exactly, and an ulp beside: fractions judge each pair."""
     rng, seen = np.random.default_rng([53, OTHERS.index(kind), len(how)]), []
@@ -77,6 +78,7 @@ def test_resting_bodies_are_decided(kind, how):
     assert seen.count(0) >= 8 and 1 in seen, seen
 
 
+@pytest.mark.slow
 def test_cans_in_unions_stand_on_meshes():
     """A can among the parts of a union, on a table of facets: exactly there, and an ulp above."""
     table = collide.Mesh(*collide.tessellate(collide.Box((2.0, 2.0, 0.5)), tolerance=0.1)[:2])

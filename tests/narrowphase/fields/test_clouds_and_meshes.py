@@ -51,6 +51,7 @@ def clouds(rng):
     yield places * (1.0, 1.0, 0.01), 0.0
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("seed", range(4))
 def test_states_and_gaps_are_those_of_all_facets(seed):
     rng, counts, left = rng_of("clouds beside meshes", seed), np.zeros(3, dtype=int), 0

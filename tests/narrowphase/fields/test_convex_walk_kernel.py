@@ -55,6 +55,7 @@ def clouds(rng):
     yield wall + np.array((4e3, -7e3, 1e3)), 0.004
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("name", SHAPES)
 def test_states_are_those_of_all_points(name):
     """Half of the questions are asked at the very gap of the pair, a hair more or less."""

@@ -166,7 +166,7 @@ def random_field(rng, case: int) -> collide.Shape:
     return collide.PointCloud(points, rng.uniform(0, 0.1, len(points)) if case % 4 else float(rng.choice([0.0, 0.1])))
 
 
-@pytest.mark.many(2)
+@pytest.mark.many(4)
 @pytest.mark.parametrize("seed", range(8))
 def test_all_questions_are_those_of_the_union_of_the_items(seed):
     rng, asked, hits = np.random.default_rng([12, seed]), 0, 0
@@ -261,6 +261,7 @@ def test_matrices_that_are_no_poses_are_refused_by_number():
             collide.collide(cloud, B, EYE, Y)
 
 
+@pytest.mark.slow
 def test_depths_among_very_many_balls_are_ways_out():
     """Boxes and balls deep in thousands of points: what is told parts them, and no ball alone is deeper."""
     rng, hits = np.random.default_rng(17), 0

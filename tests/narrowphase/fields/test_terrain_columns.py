@@ -47,6 +47,7 @@ def is_inside(points: np.ndarray, field: collide.HeightField) -> np.ndarray:
     return within & whole & (points[:, 2] < height) & (points[:, 2] > field.bottom)
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("seed", range(3))
 def test_balls_are_as_far_as_the_nearest_facet(seed):
     rng, counts = rng_of("balls over terrain", seed), np.zeros(3, dtype=int)

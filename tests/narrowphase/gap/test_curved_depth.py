@@ -33,7 +33,7 @@ def overlapping_pair(rng, *, hard: bool) -> Pair:
             return pair
 
 
-@pytest.mark.many(3)
+@pytest.mark.many(6)
 @pytest.mark.parametrize(("seed", "hard"), [(seed, hard) for seed in range(6) for hard in (False, True)])
 def test_brackets_hold_the_depth_and_are_narrow(seed, hard):
     rng = np.random.default_rng([46, seed, hard])

@@ -160,7 +160,7 @@ def pairs(kind_a: str, kind_b: str, turned: bool, n: int, seed: int):
         yield f"{kind_a}, {kind_b}, turned = {turned}, n = {n}, tilt {tilt}", A @ Q.T, X_WA, B @ S.T, X_WB
 
 
-@pytest.mark.many(3)
+@pytest.mark.many(6)
 @pytest.mark.parametrize(
     ("kind_a", "kind_b", "turned", "sizes"),
     [("cylinder", "cylinder", False, (40, 128, 512, 2048)), ("cylinder", "cylinder", True, (40, 128, 512, 2048)),

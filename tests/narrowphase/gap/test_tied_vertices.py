@@ -73,6 +73,7 @@ def test_all_level_vertices_are_listed(with_tree):
     assert seen["many"] >= 20 and seen[1] + seen[2] >= 10 and seen[9] + seen[4] + seen[8] >= 10, (seen, held[1])
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("with_tree", [False, True])
 def test_no_other_is_tied(with_tree):
     """True exactly where the level vertices are those named: also where one of these is not level itself."""

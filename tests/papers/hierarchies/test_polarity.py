@@ -229,6 +229,7 @@ def test_theorem_3_7_touching():
         assert separates(plane, cube, body)
 
 
+@pytest.mark.slow
 @SETTINGS
 @given(solids, points, solids)
 def test_theorem_3_7_with_the_spaces_exchanged(body, shift, other):

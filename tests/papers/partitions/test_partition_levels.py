@@ -231,6 +231,7 @@ def judged_grate(layers: int, is_turned: bool) -> tuple[np.ndarray, np.ndarray]:
     return (vertices @ (q * np.linalg.det(q)).T if is_turned else vertices), faces
 
 
+@pytest.mark.many(4)
 @pytest.mark.parametrize("layers, is_turned", [(1, False), (1, True), (2, False), (2, True)])
 def test_winding_numbers_are_those_of_a_point_of_each_leaf(layers, is_turned):
     """Bars that overlap or lie on one another, by the judge's rays in fractions: 0, 1 and 2 times around a leaf."""

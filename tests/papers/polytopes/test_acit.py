@@ -65,7 +65,7 @@ def pruned(seed: int, d: int, count: int):
             yield question, asked
 
 
-@pytest.mark.many(4)
+@pytest.mark.many(8)
 @pytest.mark.parametrize("d", [1, 2, 3, 4, 5])
 def test_the_recursion_alone_equals_the_oracle(d):
     spaces, depths, rounds = [], [], []

@@ -213,6 +213,7 @@ def test_the_polar_side_is_validated_and_answers_are_those_of_nodes_made_when_ne
     assert 4 <= hits <= 16 and (P.size, R.size) == before
 
 
+@pytest.mark.slow
 def test_sizes_are_predicted_from_a_sample(monkeypatch):
     """A boundary of a million simplices is told from samples of 60 and 120 points, and refused unseen."""
     monkeypatch.setattr(tree_size, "_LARGE_MODEL", 3000)
