@@ -40,6 +40,7 @@ if TYPE_CHECKING:
         UnknownBody,
         UnsupportedQuery,
     )
+    from collide.hull_levels.nested_hulls import NestedHull, nested_hulls
     from collide.kernels.library import include_folder as get_include
     from collide.kernels.library import library_path as get_library
     from collide.motion.impact_query import moved_poses, poses_in_motion, time_of_impact
@@ -145,6 +146,7 @@ _HOMES = {
     "collide.derivatives.pair_derivatives": ("PairDerivatives",),
     "collide.derivatives.soft_minimum": ("SoftMinimum", "soft_minimum"),
     "collide.derivatives.uniqueness": ("Uniqueness",),
+    "collide.hull_levels.nested_hulls": ("NestedHull", "nested_hulls"),
     "collide.pairs.query": ("collide", "distance"),
     "collide.pairs.smoothed_distances": ("SmoothedDistances", "smoothed_distances"),
     "collide.pose_arrays": ("poses",),
@@ -194,17 +196,17 @@ __all__ = [
     "Contacts", "ConvexCells", "ConvexHull", "ConvexParts", "ConvexPolygon", "Cylinder", "DrawnConfigurations",
     "Ellipsoid", "EnclosingSpheres", "FacetPairs", "GridDistances", "HPolytope", "Halfspace", "HeightField", "How",
     "InvalidArgument", "InvalidPose", "InvalidShape", "LinkPair", "Located", "Mesh", "MissingExtra", "MotionPlan",
-    "OcTree", "OcTreeLeaves", "OverlapVolume", "Overlay", "PairDerivatives", "PairResult", "PartitionSize",
-    "PieceAudit", "PlanarObstacle", "Plane", "PointCloud", "Portals", "Proposal", "RayHits", "RepairedMesh", "Robot",
-    "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet",
-    "SignedDistanceGrid", "SignedDistances", "SmoothedDistances", "SoftMinimum", "SpacePartition", "Sphere", "Spline",
-    "SweepResults", "SweptMesh", "TetMesh", "TimeOfImpact", "Uniqueness", "UnknownBody", "UnsupportedQuery",
+    "NestedHull", "OcTree", "OcTreeLeaves", "OverlapVolume", "Overlay", "PairDerivatives", "PairResult",
+    "PartitionSize", "PieceAudit", "PlanarObstacle", "Plane", "PointCloud", "Portals", "Proposal", "RayHits",
+    "RepairedMesh", "Robot", "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts",
+    "ShapeSet", "SignedDistanceGrid", "SignedDistances", "SmoothedDistances", "SoftMinimum", "SpacePartition", "Sphere",
+    "Spline", "SweepResults", "SweptMesh", "TetMesh", "TimeOfImpact", "Uniqueness", "UnknownBody", "UnsupportedQuery",
     "VoxelGrid", "World", "WorldBatch", "WorldBatchResult", "WorldHits", "WorldResult", "audit_pieces", "boolean",
     "certify", "collide", "combine", "configuration_obstacle", "contacts", "contains", "distance", "enclosing_spheres",
-    "facet_pairs", "get_include", "get_library", "moved_poses", "overlap_volume", "overlapping_cells", "overlay",
-    "plan", "pose", "poses", "poses_in_motion", "propose_disabled_pairs", "raycast", "read_sweep", "repaired",
-    "self_collisions", "self_overlapping_cells", "shape_cast", "signed_distances", "smoothed_distances", "soft_minimum",
-    "sweep", "tessellate", "time_of_impact", "to_library", "verify", "walk",
+    "facet_pairs", "get_include", "get_library", "moved_poses", "nested_hulls", "overlap_volume", "overlapping_cells",
+    "overlay", "plan", "pose", "poses", "poses_in_motion", "propose_disabled_pairs", "raycast", "read_sweep",
+    "repaired", "self_collisions", "self_overlapping_cells", "shape_cast", "signed_distances", "smoothed_distances",
+    "soft_minimum", "sweep", "tessellate", "time_of_impact", "to_library", "verify", "walk",
 ]
 
 

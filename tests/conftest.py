@@ -62,7 +62,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log):
 @pytest.hookimpl(wrapper=True)
 def pytest_collection(session: pytest.Session):
     """What is made while tests are collected stays: looking through it for garbage again and again would take a third
-    of the time, and a twelfth of the tests' time after it; frozen, it is not looked at where a test collects, either."""
+    of the time, and a twelfth of the tests' time after it. Frozen, a test that collects does not look at it."""
     gc.disable()
     try:
         return (yield)

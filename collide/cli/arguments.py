@@ -27,7 +27,7 @@ from collide.cli import spheres_command as cli_spheres
 from collide.cli import srdf as cli_srdf
 from collide.cli import sweep_command as cli_sweep
 from collide.cli import view as cli_view
-from collide.errors import InvalidArgument
+from collide.errors import CollideError, InvalidArgument
 from collide.reports.number_format import parse_length
 
 
@@ -320,8 +320,9 @@ def _scene_arguments(parser: argparse.ArgumentParser, at_least: int = 1) -> None
 def _mesh_arguments(group) -> None:
     """How mesh files are found and taken.   group : a parser, or a group of one."""
     kind = group.add_mutually_exclusive_group()
-    kind.add_argument("--meshes", choices=("mesh", "repaired", "hull", "pieces"), metavar="HOW",
-                      help="how meshes enter: mesh (as they are, the default), repaired, hull (convex hulls) or pieces "
+    kind.add_argument("--meshes", type=_meshes, metavar="HOW",
+                      help="how meshes enter: mesh (as they are, the default), repaired, hull (convex hulls), hull:64 "
+                           "(of at most 64 of their vertices), hull+:64 (of at most 64 corners around them) or pieces "
                            "(unions of convex pieces)")
     kind.add_argument("--repair", action="store_const", const="repaired", dest="meshes",
                       help="--meshes repaired: make solids of broken meshes (holes, facets turned over, repeats), and "
@@ -361,6 +362,17 @@ def _length(text: str) -> float:
         return parse_length(text)
     except InvalidArgument as error:
         raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _meshes(text: str) -> str:
+    """What meshes become, checked before any file is read."""
+    from collide.scenes.loaders.mesh_file import check_meshes_option
+
+    try:
+        check_meshes_option(text)
+    except CollideError as error:
+        raise argparse.ArgumentTypeError(str(error).removeprefix("meshes ")) from None
+    return text
 
 
 def _scale(text: str) -> float:

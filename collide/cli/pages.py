@@ -126,7 +126,7 @@ def _looks(args, scene):
     from collide.scenes.loaders.visual_shapes import visual_shapes
 
     whole, unread = None, []
-    if args.meshes in ("hull", "pieces") and any(body.approximation for body in scene.bodies):
+    if (args.meshes or "mesh").startswith(("hull", "pieces")) and any(body.approximation for body in scene.bodies):
         try:
             whole = cli_scenes.load_states(Namespace(**{**vars(args), "meshes": "mesh"}), silent)[0][1]
         except CollideError as error:

@@ -73,10 +73,12 @@ def load(
         For MoveIt planning scenes: the robot, or its file.
     srdf : str, Path or bool, optional
         The SRDF of a URDF; None looks beside it, False does without.
-    meshes : {"mesh", "repaired", "hull", "pieces"}
+    meshes : {"mesh", "repaired", "hull", "hull:64", "hull+:64", "pieces"}
         "mesh": triangles as they are, a `collide.Mesh`, solid where they close; "repaired": the same, meshes that are
-        no solids repaired as by `collide.repaired`; "hull": the convex hull of the vertices; "pieces": a union of
-        convex pieces (coacd). Each body's ``approximation`` says what was repaired, or what the last two leave out.
+        no solids repaired as by `collide.repaired`; "hull": the convex hull of the vertices; "hull:64": of at most
+        64 of them; "hull+:64": of at most 64 corners around all, proven (docs/nested_hulls.md); "pieces": a
+        union of convex pieces (coacd). Each body's ``approximation`` says what was repaired, or what hulls and pieces
+        leave out or add.
     package_path : str, Path or iterable of them
         Folders in which ``package://`` names are looked for first.
     scale : float or str, optional

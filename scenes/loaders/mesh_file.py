@@ -16,11 +16,15 @@ import numpy as np
 from collide.base import argument_checks as checks
 from collide.errors import InvalidShape, MissingExtra, SceneError
 from collide.scenes import mesh_cache as cache
+from collide.scenes.loaders.fields import Fields, did_you_mean
+from collide.scenes.loaders.hull_levels import split_level
 from collide.scenes.loaders.mesh_parts import MeshFile, MeshPart, described, distinct
 from collide.scenes.loaders.triangles import SUFFIXES, MeshBytes, open_mesh, triangles_of
 
 #: What a mesh may become: itself, itself repaired, the hull of its vertices, or a union of convex pieces.
 OPTIONS = ("mesh", "repaired", "hull", "pieces")
+#: The same as users are told.
+OPTION_NAMES = '"mesh", "repaired", "hull", "hull:64", "hull+:64" or "pieces"'
 REPAIRED = "repaired"
 #: Those that keep its facets.
 AS_THEY_ARE = ("mesh", REPAIRED)
@@ -31,10 +35,11 @@ CONVEX_RATIO = 1.0 - 1e-6
 def read_mesh(path: Path, meshes: str = "mesh") -> MeshFile:
     """The meshes of a file, from the cache of prepared inputs or by its reader.
 
-    meshes : "mesh" for the triangles, "repaired" for those of a solid where one can be made of them, "hull", or
-        "pieces" for a convex decomposition of every mesh.
+    meshes : "mesh" for the triangles, "repaired" for those of a solid where one can be made of them, "hull", "hull:64"
+        and "hull+:64" (`hull_levels.py`), or "pieces" for a convex decomposition of every mesh.
     """
     check_meshes_option(meshes)
+    meshes, level = split_level(meshes)
     if path.suffix.lower() not in SUFFIXES:
         raise SceneError(f"unknown mesh format {path.suffix!r}; known are {', '.join(SUFFIXES)}", path=path)
     opened = open_mesh(path)
@@ -48,6 +53,8 @@ def read_mesh(path: Path, meshes: str = "mesh") -> MeshFile:
             for part, (vertices, faces) in zip(file.parts, raw):
                 part.pieces = _decompose(vertices, faces, path)
         cache.store(entry, _pack(file))
+    for part in file.parts:
+        part.level = level
     # The entry knows the bytes alone: a file of the same bytes may have another name.
     if len(file.parts) == 1:
         file.parts[0].name = path.stem
@@ -64,8 +71,18 @@ def _from_cache(entry: str) -> MeshFile | None:
 
 
 def check_meshes_option(meshes: str) -> None:
-    if not isinstance(meshes, str) or meshes not in OPTIONS:
-        raise SceneError(f'meshes must be "mesh", "repaired", "hull" or "pieces", got {checks.brief(meshes)}')
+    if not isinstance(meshes, str) or split_level(meshes)[0] not in OPTIONS:
+        raise SceneError(f"meshes must be {OPTION_NAMES}, got {checks.brief(meshes)}")
+
+
+def meshes_option(fields: Fields, key: str, default: str) -> str:
+    """An option for meshes in a scene file."""
+    value = fields.text(key) if key in fields else default
+    try:
+        check_meshes_option(value)
+    except SceneError:
+        fields.fail(f"must be {OPTION_NAMES}, got {checks.brief(value)}{did_you_mean(value, OPTIONS)}", key)
+    return value
 
 
 def size_note(extent: float, what: str) -> str | None:
@@ -128,7 +145,8 @@ def part_of_arrays(label: str, vertices: np.ndarray, faces: np.ndarray, meshes: 
     part = _as_it_is(label, vertices, faces, path, meshes == REPAIRED)
     if meshes in AS_THEY_ARE:
         return part
-    whole = MeshPart(label, distinct(vertices[np.unique(faces)]), np.nan, part.closed, part.faces)
+    meshes, level = split_level(meshes)
+    whole = MeshPart(label, distinct(vertices[np.unique(faces)]), np.nan, part.closed, part.faces, level=level)
     if part.own_hull:
         whole.fill = 1.0
     elif meshes == "pieces":

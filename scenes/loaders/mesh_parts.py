@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from collide.mesh.convex_surface import is_own_hull
+from collide.scenes.loaders.hull_levels import HullLevel
 from collide.shapes.mesh import Mesh
 from collide.shapes.shape import Shape
 
@@ -26,6 +27,7 @@ class MeshPart:
     facets : (faces, 3) rows of ``points``, as the file has them, where the mesh is taken as it is.
     own_hull : these are exactly the surface of their convex hull.   made : shapes made of it, by scale.
     repairs : the steps of its repair in words, with facet numbers; None where none was asked for.
+    level : of a hull that is to have few vertices.
     """
 
     name: str
@@ -38,6 +40,7 @@ class MeshPart:
     own_hull: bool = False
     made: dict[tuple, Shape] = field(default_factory=dict)
     repairs: list[str] | None = None
+    level: HullLevel | None = None
 
 
 @dataclass

@@ -13,6 +13,7 @@ import numpy as np
 
 from collide.errors import InvalidShape, SceneError
 from collide.mesh.convex_surface import is_own_hull
+from collide.scenes.loaders.hull_levels import HullLevel, hull_of_level, split_level
 from collide.scenes.loaders.mesh_file import AS_THEY_ARE, CONVEX_RATIO, REPAIRED
 from collide.scenes.loaders.mesh_parts import NOT_REPAIRED, MeshFile, MeshPart, described, distinct
 from collide.shapes.compound import Compound
@@ -40,7 +41,7 @@ def part_shape(part: MeshPart, scale, place: str) -> Taken:
             return Taken(_union([ConvexHull(_times(points, factors)) for points in part.pieces]), _about_pieces(part))
         if part.facets is not None:
             return Taken(_as_it_is(part, factors), _about_repairs(part))
-        return Taken(ConvexHull(_times(part.points, factors)), _about_hull(part))
+        return _hull(_times(part.points, factors), part.level, _about_hull(part))
     except InvalidShape as error:
         raise InvalidShape(f"{place}: {error}") from None
 
@@ -95,7 +96,15 @@ def inline_shape(vertices: np.ndarray, faces: np.ndarray, meshes: str, place: st
             )
         return part_shape(described("mesh", vertices, faces, repair=meshes == REPAIRED), 1.0, place)
     hull = ConvexHull(vertices).without_repeats()
-    return Taken(hull, f"hull of {len(hull.points)} vertices of a mesh in the file")
+    about = f"hull of {len(hull.points)} vertices of a mesh in the file"
+    return _hull(hull.points, split_level(meshes)[1], about)
+
+
+def _hull(points: np.ndarray, level: HullLevel | None, about: str | None) -> Taken:
+    if level is None:
+        return Taken(ConvexHull(points), about)
+    hull, difference = hull_of_level(points, level)
+    return Taken(hull, "; ".join(filter(None, (about, difference))) or None)
 
 
 def _as_it_is(part: MeshPart, factors: np.ndarray) -> Shape:
@@ -129,7 +138,8 @@ def _joined(parts: list[MeshPart]) -> MeshPart:
 
 def _joined_points(parts: list[MeshPart]) -> MeshPart:
     points = distinct(np.concatenate([part.points for part in parts]))
-    return MeshPart(parts[0].name, points, np.nan, False, sum(part.faces for part in parts))
+    faces = sum(part.faces for part in parts)
+    return MeshPart(parts[0].name, points, np.nan, False, faces, level=parts[0].level)
 
 
 def _union(hulls: list[ConvexHull]) -> Shape:

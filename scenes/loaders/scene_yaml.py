@@ -19,7 +19,7 @@ from collide.scenes.loaders import mjcf, resources, sdformat, shape_yaml, urdf
 from collide.scenes.loaders.documents import parse_document
 from collide.scenes.loaders.fields import Fields, did_you_mean, read_each, read_pose
 from collide.scenes.loaders.files import MAX_INCLUDED
-from collide.scenes.loaders.mesh_file import OPTIONS, MeshFile, read_mesh
+from collide.scenes.loaders.mesh_file import MeshFile, meshes_option, read_mesh
 from collide.scenes.loaders.robot_yaml import inline_robot
 from collide.scenes.loaders.states import state_of
 
@@ -164,7 +164,7 @@ def _prefix(entry: Fields) -> str:
 def _read_robot(building: _Building, entry: Fields) -> Robot | mjcf.MjcfFile:
     if sum(key in entry for key in ("urdf", "mjcf", "sdf", "robot")) != 1:
         entry.fail("give one of urdf, mjcf and sdf, a file, or robot, a description with links and joints")
-    meshes = entry.choice("meshes", OPTIONS, building.meshes)
+    meshes = meshes_option(entry, "meshes", building.meshes)
     if "robot" in entry:
         return inline_robot(
             entry, building.metres, shape_yaml.Files(

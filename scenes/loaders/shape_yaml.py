@@ -179,7 +179,7 @@ def _mesh(fields: Fields, files: Files) -> Described:
     if beside:
         fields.fail(f"{beside[0]!r} stands in place of a file: give one of them")
     scale = _mesh_scale(fields)
-    taken = fields.choice("as", mesh_loader.OPTIONS, "mesh") if "as" in fields else None
+    taken = mesh_loader.meshes_option(fields, "as", "mesh") if "as" in fields else None
     file = files.mesh(fields.text("file"), fields.place("file"), taken)
     shapes = element_shapes(file, scale, f"{fields.path}: {fields.element}")
     about = [approximation for _, approximation in shapes if approximation]

@@ -59,6 +59,7 @@ ROOMS = {
         "errors", "base", "kernels", "transforms", "results", "numerics", "hull", "curved", "support", "mesh", "shapes",
         "lowering", "narrowphase", "pairs",
     },
+    "hull_levels": {"errors", "base", "hull", "shapes", "lowering", "pairs"},
     "casts": {
         "errors", "base", "kernels", "transforms", "results", "numerics", "least_distance", "curved", "support", "mesh",
         "shapes", "lowering", "broadphase", "narrowphase", "certificates", "pairs",

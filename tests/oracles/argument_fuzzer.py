@@ -267,6 +267,7 @@ GOOD: dict[str, Callable[[], dict[str, Any]]] = {
     "Robot": lambda: {"name": "r", "links": ["a"], "joints": []},
     "RobotChecker": lambda: {"robot": robot()},
     "enclosing_spheres": lambda: {"shape": collide.Box((1.0, 1.0, 1.0))},
+    "nested_hulls": lambda: {"shape": collide.Box((1.0, 1.0, 1.0)), "sizes": [8, 16]},
     "audit_pieces": lambda: {"shape": collide.Box((1.0, 1.0, 1.0)), "pieces": collide.Box((1.0, 1.0, 1.1))},
     "plan": lambda: {
         "checker": collide.RobotChecker(robot(), allowed=[("base", "slider")]), "start": [0.0], "goal": [0.1],

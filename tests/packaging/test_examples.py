@@ -189,6 +189,7 @@ GIVEN = {
     "life_of_a_query": "X_WA, X_WB = np.eye(4), collide.pose((1, 0, 0))\n"
     "mesh = collide.Mesh(*collide.tessellate(collide.Sphere(0.5))[:2])",
     "locality": "",
+    "nested_hulls": "",
     "meshes": "A = B = shape = mesh = collide.Mesh(*collide.tessellate(collide.Sphere(0.5))[:2])\n"
     "X_WA, X_WB = np.eye(4), collide.pose((0.3, 0, 0))\n"
     "points_W = origins_W = np.zeros((2, 3)); directions_W = [(1, 0, 0), (0, 1, 0)]",
