@@ -215,7 +215,7 @@ static void put_gradients(collide_robot_workspace *space, const double *q, int64
                           const collide_pair *rows, double *gradients)
 {
     space->robot->kernels->distance_gradients(address_of(space->scene), address_of(q), space->robot->sizes[F_COLUMNS], n,
-                                              address_of(of), m, address_of(space->robot->moves), address_of(rows),
+                                              address_of(of), m, address_of(space->robot->moves), address_of(rows), 0,
                                               address_of(gradients));
 }
 

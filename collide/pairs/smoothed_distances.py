@@ -26,6 +26,7 @@ from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument
 from collide.pairs.pair_arguments import pose_batch
 from collide.pairs.query import distance
+from collide.shapes.shape import checked_shape
 from collide.transforms import rotation_from_unit
 
 if TYPE_CHECKING:
@@ -89,6 +90,8 @@ def smoothed_distances(
     -----
     One batch of N · samples pairs. Variances are finite, and means of samples near the truth by a few standard errors.
     """
+    for name, shape in (("A", A), ("B", B)):
+        checked_shape(f"smoothed_distances: {name}", shape)
     sigma, tau = checks.length("angle", angle), checks.length("length", length)
     n = checks.integer("samples", samples, 4)
     if n % 2 or n > _MAX_SAMPLES:

@@ -15,7 +15,7 @@ from collide.robots.check_tables import Setting
 from collide.robots.check_workspace import CheckWorkspace
 from collide.robots.checker_scene import CheckerScene
 from collide.robots.configuration_batches import asked_poses, both_bodies
-from collide.robots.distance_gradients import distance_gradients
+from collide.robots.distance_gradients import WITNESS, distance_gradients, point_jacobians
 from collide.robots.nearest_pairs import (
     AMONG_ROBOT,
     FIRST_LIMIT,
@@ -100,35 +100,36 @@ def measure(checker: CheckerScene, q: np.ndarray, question: DistanceQuestion, th
             pieces[piece.start] = near_piece(checker, space, q[piece], question)
 
         checker.in_pieces(n, threads, progress, put)
-        rows, gradient, counts = _joined([pieces[start] for start in sorted(pieces)], q.shape[1])
+        rows, gradient, witness, counts = _joined([pieces[start] for start in sorted(pieces)], q.shape[1])
         starts = np.zeros(n + 1, dtype=np.int64)
         np.cumsum(counts, out=starts[1:])
-        return RobotDistances(rows, gradient, checker.bodies, checker.around, starts)
+        return RobotDistances(rows, gradient, checker.bodies, checker.around, starts, witness)
     width = len(checker.setting.bodies) if question.per == OF_BODY else 1
     rows, gradient = np.zeros(n * width, dtype=NEAREST_DTYPE), np.empty((n * width, q.shape[1]))
+    witness = np.empty((n * width, WITNESS))
 
     def fill(space: CheckWorkspace, piece: slice) -> None:
         to = slice(width * piece.start, width * piece.stop)
-        measure_piece(checker, space, q[piece], rows[to], gradient[to], question)
+        measure_piece(checker, space, q[piece], rows[to], gradient[to], witness[to], question)
 
     checker.in_pieces(n, threads, progress, fill)
-    return RobotDistances(rows, gradient, checker.bodies, checker.around, width * np.arange(n + 1))
+    return RobotDistances(rows, gradient, checker.bodies, checker.around, width * np.arange(n + 1), witness)
 
 
 def _joined(pieces: list[tuple], dof: int) -> tuple:
-    """(rows, gradients, counts) of pieces one after the other."""
+    """(rows, gradients, witnesses, counts) of pieces one after the other."""
     if len(pieces) == 1:
         return pieces[0]
-    nothing = np.zeros(0, dtype=NEAREST_DTYPE), np.zeros((0, dof)), np.zeros(0, dtype=np.int64)
+    nothing = np.zeros(0, dtype=NEAREST_DTYPE), np.zeros((0, dof)), np.zeros((0, WITNESS)), np.zeros(0, dtype=np.int64)
     return tuple(map(np.concatenate, zip(nothing, *pieces)))
 
 
 def measure_piece(
     checker: CheckerScene, space: CheckWorkspace, q: np.ndarray, out: np.ndarray, gradient: np.ndarray,
-    question: DistanceQuestion,
+    witness: np.ndarray, question: DistanceQuestion,
 ) -> None:
-    """``out`` (n·slots,) NEAREST_DTYPE and ``gradient`` (n·slots, dof) become the nearest pairs of configurations q
-    (n, dof), a slot a configuration or a slot a body of the robot.
+    """``out`` (n·slots,) NEAREST_DTYPE, ``gradient`` (n·slots, dof) and ``witness`` (n·slots, WITNESS) become those of
+    the nearest pairs of configurations q (n, dof), a slot a configuration or a slot a body of the robot.
     """
     rows = _nearest_rows(checker, space, q, question)
     if question.per == OF_BODY:  # the slot's body comes first
@@ -136,13 +137,13 @@ def measure_piece(
         rows[is_second] = flipped(rows[is_second])
     of = np.arange(len(q)) if rows.shape[1] == 1 else np.arange(rows.size) // rows.shape[1]
     rows = rows.reshape(-1)
-    _put_gradients(checker, space, q, of, rows, gradient)
+    _put_gradients(checker, space, q, of, rows, gradient, witness)
     _finish(rows, out, question.limit)
 
 
 def near_piece(checker: CheckerScene, space: CheckWorkspace, q: np.ndarray, question: DistanceQuestion) -> tuple:
-    """((m,) NEAREST_DTYPE, (m, dof) gradients, (n,) numbers of rows) of all pairs within the limit, of configurations q
-    (n, dof).
+    """((m,) NEAREST_DTYPE, (m, dof) gradients, (m, WITNESS), (n,) numbers of rows) of all pairs within the limit, of
+    configurations q (n, dof).
     """
     starts, done, least, pieces = np.zeros(len(q) + 1, dtype=np.int64), 0, _PAIR_SLOTS, []
     while done < len(q):
@@ -157,9 +158,10 @@ def near_piece(checker: CheckerScene, space: CheckWorkspace, q: np.ndarray, ques
         of = np.repeat(np.arange(first, done), np.diff(starts[first : done + 1]))
         of, near = _with_open(checker, space, q, of, slots.rows[: len(of)], question.limit)
         rows, gradient = np.zeros(len(near), dtype=NEAREST_DTYPE), np.empty((len(near), q.shape[1]))
-        _put_gradients(checker, space, q, of, near, gradient)
+        witness = np.empty((len(near), WITNESS))
+        _put_gradients(checker, space, q, of, near, gradient, witness)
         _finish(near, rows, question.limit)
-        pieces.append((rows, gradient, np.bincount(of - first, minlength=done - first)))
+        pieces.append((rows, gradient, witness, np.bincount(of - first, minlength=done - first)))
     return _joined(pieces, q.shape[1])
 
 
@@ -190,13 +192,32 @@ def _with_open(
 
 
 def _put_gradients(
-    checker: CheckerScene, space: CheckWorkspace, q: np.ndarray, of: np.ndarray, rows: np.ndarray, out: np.ndarray
+    checker: CheckerScene, space: CheckWorkspace, q: np.ndarray, of: np.ndarray, rows: np.ndarray, out: np.ndarray,
+    witness: np.ndarray,
 ) -> None:
-    """``out`` (m, dof) becomes gradients of rows (m,) of PAIR_DTYPE, of the configurations ``of`` (m,) among q."""
+    """``out`` (m, dof) becomes gradients of rows (m,) of PAIR_DTYPE, of the configurations ``of`` (m,) among q, and
+    ``witness`` (m, WITNESS) their normals and points.
+    """
     distance_gradients(
         space.address, address_of(q), checker.robot.dof, len(q), address_of(of), len(of),
-        address_of(checker.robot.moves), address_of(rows), address_of(out),
+        address_of(checker.robot.moves), address_of(rows), address_of(witness), address_of(out),
     )
+
+
+def jacobians(checker: CheckerScene, q: np.ndarray, bodies: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """(m, 3, dof) derivatives of points (m, 3) in W that move with bodies (m,) of the robot, of configurations q
+    (m, dof).
+    """
+    out = np.empty((len(q), 3, q.shape[1]))
+
+    def put(space: CheckWorkspace, piece: slice) -> None:
+        asked = [np.ascontiguousarray(array[piece]) for array in (q, bodies, points)]
+        at = [address_of(array) for array in asked]
+        moves = address_of(checker.robot.moves)
+        point_jacobians(space.address, at[0], q.shape[1], len(asked[0]), moves, at[1], at[2], address_of(out[piece]))
+
+    checker.in_pieces(len(q), 1, None, put)
+    return out
 
 
 def _finish(rows: np.ndarray, out: np.ndarray, limit: float) -> None:

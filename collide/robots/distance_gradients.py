@@ -16,7 +16,7 @@ import math
 from collide.kernels import entry, kernel, view_f64, view_i64, view_u8
 from collide.lowering.shape_table import POSE
 from collide.narrowphase.rows import BODY_B, CERTIFIED, DISTANCE, ROW, view_row
-from collide.numerics.vec3 import Vec3, cross, dot, neg, rotate, sub, vec3_at
+from collide.numerics.vec3 import Vec3, cross, dot, neg, put_vec3, rotate, sub, vec3_at
 from collide.robots.check_configurations import begin_configuration
 from collide.robots.check_scene import BODY_INTS, LINK, N_LINKS, view_scene
 from collide.robots.forward_kinematics import (
@@ -39,19 +39,24 @@ from collide.robots.forward_kinematics import (
 from collide.robots.nearest_pairs import BODY_A, NONE
 from collide.robots.settled_normals import normal_of_row, unknown_normal
 
+#: Doubles of a row's normal and witness points, as derivatives take them.
+WITNESS = 9
 
-@entry("void(int64, int64, int64, int64, int64, int64, int64, int64, int64)")
-def distance_gradients(header_at, q_at, dof, n, of_at, m, moves_at, rows_at, out_at):
+
+@entry("void(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)")
+def distance_gradients(header_at, q_at, dof, n, of_at, m, moves_at, rows_at, witness_at, out_at):
     """(m, dof) derivatives [m/rad or m/m] for rows of `nearest_pairs.py`; NaN where the distance has no derivative, for
     the reason in `RobotDistances.no_gradient`.
 
     of : (m,) the configuration of each row, of n.   moves : (joints, links) bytes, 1 where a joint moves a link.
+    witness : (m, WITNESS) receives the normal, NaN where not known, and points of both bodies in W; 0 for nowhere.
     """
     scene = view_scene(header_at)
     joints = scene.joints
     n_links = scene.words[N_LINKS]
     q = view_f64(q_at, dof * n)
     of = view_i64(of_at, m)
+    witness = view_f64(witness_at, WITNESS * m)
     out = view_f64(out_at, dof * m)
     moves = view_u8(moves_at, joints.n * n_links)
     placed = -1
@@ -65,6 +70,10 @@ def distance_gradients(header_at, q_at, dof, n, of_at, m, moves_at, rows_at, out
                 placed = at
                 begin_configuration(scene, q, at)
             normal = normal_of_row(scene, row)
+        if witness_at != 0:
+            put_vec3(witness, WITNESS * k, normal.nhat)
+            put_vec3(witness, WITNESS * k + 3, normal.p_a)
+            put_vec3(witness, WITNESS * k + 6, normal.p_b)
         is_differentiable = normal.nhat.x == normal.nhat.x
         for j in range(dof):
             out[dof * k + j] = 0.0 if is_differentiable else math.nan
@@ -79,6 +88,33 @@ def distance_gradients(header_at, q_at, dof, n, of_at, m, moves_at, rows_at, out
                 _add_joint(scene, j, q, at, neg(normal.nhat), normal.p_a, out, dof * k)
             elif moves_b and not moves_a:
                 _add_joint(scene, j, q, at, normal.nhat, normal.p_b, out, dof * k)
+
+
+@entry("void(int64, int64, int64, int64, int64, int64, int64, int64)")
+def point_jacobians(header_at, q_at, dof, m, moves_at, bodies_at, points_at, out_at):
+    """(m, 3, dof) derivatives by q of points (m, 3) in W that move with bodies of the robot, at configurations q
+    (m, dof).
+
+    moves : (joints, links) bytes, 1 where a joint moves a link.   bodies : (m,) int64.
+    """
+    scene = view_scene(header_at)
+    n_links = scene.words[N_LINKS]
+    q = view_f64(q_at, dof * m)
+    bodies = view_i64(bodies_at, m)
+    points = view_f64(points_at, 3 * m)
+    out = view_f64(out_at, 3 * dof * m)
+    moves = view_u8(moves_at, scene.joints.n * n_links)
+    for k in range(m):
+        begin_configuration(scene, q, dof * k)
+        link = scene.bodies[BODY_INTS * bodies[k] + LINK]
+        for j in range(3 * dof):
+            out[3 * dof * k + j] = 0.0
+        for j in range(scene.joints.n):
+            if moves[n_links * j + link] != 0:
+                p_W = vec3_at(points, 3 * k)
+                _add_joint(scene, j, q, dof * k, Vec3(1.0, 0.0, 0.0), p_W, out, dof * (3 * k))
+                _add_joint(scene, j, q, dof * k, Vec3(0.0, 1.0, 0.0), p_W, out, dof * (3 * k + 1))
+                _add_joint(scene, j, q, dof * k, Vec3(0.0, 0.0, 1.0), p_W, out, dof * (3 * k + 2))
 
 
 @kernel

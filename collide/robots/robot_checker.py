@@ -19,7 +19,7 @@ from collide.robots.checker_file import checker_bytes
 from collide.robots.checker_scene import CheckerScene
 from collide.robots.configuration_batches import check_piece
 from collide.robots.configuration_report import ConfigurationReport
-from collide.robots.distance_batches import BETWEEN, PER, DistanceQuestion, measure
+from collide.robots.distance_batches import BETWEEN, PER, DistanceQuestion, jacobians, measure
 from collide.robots.moving_obstacles import among_moving
 from collide.robots.robot import Robot
 from collide.robots.robot_bodies import padding_of
@@ -275,6 +275,43 @@ class RobotChecker(CheckerScene):
         question = DistanceQuestion(limit, _word("per", per, PER), _word("between", between, BETWEEN))
         q, _ = self._configurations(Q)
         return measure(self._as_of_now(), q, question, threads, progress)
+
+    def point_jacobians(self, Q, bodies, points_W) -> np.ndarray:
+        """How points that move with bodies of the robot change with the columns of q.
+
+        Parameters
+        ----------
+        Q : (M, dof) or (dof,) array_like, float64
+            A configuration for each point, or a single one for all.
+        bodies : (M,) array_like of int
+            Numbers of bodies, as rows of `distances` and ``bodies`` have them: links, and what is attached to these.
+        points_W : (M, 3) array_like, float64
+            The points in W [m], at these configurations.
+
+        Returns
+        -------
+        (M, 3, dof) float64
+            Derivatives of the points, fixed to the bodies, in W [m/rad or m/m]: with n and both points of a row of
+            `distances`, ``gradient`` is n · (J_b − J_a). Witness points themselves also slide over the bodies.
+
+        Raises
+        ------
+        InvalidArgument
+            As of `collides`, for numbers of no body of the robot, and for other numbers of points.
+
+        Notes
+        -----
+        O(M joints).
+        """
+        who = "RobotChecker.point_jacobians"
+        points, _ = checks.vectors(who, "points_W", points_W)
+        q, _ = self._configurations(Q)
+        numbers = checks.whole_numbers(f"{who}: bodies", bodies).reshape(-1)
+        count = checks.matched_count(who, Q=len(q), bodies=len(numbers), points_W=len(points))
+        outside = (numbers < 0) | (numbers >= len(self.bodies))
+        checks.refuse_rows(who, "bodies", numbers, outside, f"is no body of the robot, which has {len(self.bodies)}")
+        q, numbers = (np.ascontiguousarray(np.broadcast_to(a, (count, *a.shape[1:]))) for a in (q, numbers))
+        return jacobians(self._as_of_now(), q, numbers, np.ascontiguousarray(np.broadcast_to(points, (count, 3))))
 
     def edge_collides(self, Q0, Q1, *, resolution: float = 0.01, wrap: bool = False, threads: int = 1) -> np.ndarray:
         """Whether straight motions collide at samples; motions between two samples are not checked.

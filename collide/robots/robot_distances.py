@@ -54,14 +54,17 @@ class RobotDistances:
         Names of the robot's bodies, and of the bodies around.
     starts : (N + 1,) int64
         Where rows of configurations begin and end, by default a row each.
+    witness : (M, 9) float64
+        The normal and both witness points in W as derivatives take them; NaN where no derivative is known.
 
     """
 
     def __init__(
         self, rows: np.ndarray, gradient: np.ndarray, bodies: Sequence[str], around: Sequence[str],
-        starts: np.ndarray | None = None,
+        starts: np.ndarray | None = None, witness: np.ndarray | None = None,
     ):
         self.rows, self.gradient = rows, gradient
+        self._witness = np.full((len(rows), 9), np.nan) if witness is None else witness
         self.starts = np.arange(len(rows) + 1) if starts is None else starts
         self._bodies, self._around = list(bodies), list(around)
 
@@ -82,6 +85,46 @@ class RobotDistances:
             None if a < 0 else (self._bodies[a], self._bodies[b] if b >= 0 else self._around[-1 - b])
             for a, b in zip(self.rows["a"].tolist(), self.rows["b"].tolist())
         ]
+
+    @property
+    def d_pose_a(self) -> np.ndarray:
+        """Derivative of ``distance`` by the pose of body a alone: of the link, or of the object attached to the link.
+
+        Returns
+        -------
+        (M, 6) float64
+            By a turn about the origin of W [m/rad], then by a shift [m/m], along the axes of W:
+            −(point_a × normal), −normal. About another point o: the turn's minus o × the shift's. NaN where
+            ``gradient`` is.
+        """
+        return -self._wrench(3)
+
+    @property
+    def d_pose_b(self) -> np.ndarray:
+        """Derivative of ``distance`` by the pose of body b alone, a body of the robot or around.
+
+        Returns
+        -------
+        (M, 6) float64
+            As `d_pose_a`: point_b × normal, normal.
+        """
+        return self._wrench(6)
+
+    @property
+    def d_base(self) -> np.ndarray:
+        """Derivative of ``distance`` by the pose of the robot's base: all bodies of the robot move together.
+
+        Returns
+        -------
+        (M, 6) float64
+            As `d_pose_a`, and 0 between two bodies of the robot.
+        """
+        return np.where(self.rows["b"][:, None] >= 0, 0.0 * self.d_pose_a, self.d_pose_a)
+
+    def _wrench(self, at: int) -> np.ndarray:
+        normal, point = self._witness[:, :3], self._witness[:, at : at + 3]
+        unknown = np.isnan(self.gradient).any(axis=1) | np.isnan(normal).any(axis=1)
+        return np.where(unknown[:, None], np.nan, np.hstack([np.cross(point, normal), normal]))
 
     @property
     def no_gradient(self) -> list[str | None]:

@@ -476,6 +476,7 @@ METHODS: dict[str, Callable[[], dict[str, Any]]] = {
     "Robot.limit_notes": lambda: {"q": np.zeros(1)},
     "Robot.renamed": lambda: {"prefix": "p"},
     "RobotChecker.names_of": lambda: {"a": 0, "b": 1},
+    "RobotChecker.point_jacobians": lambda: {"Q": [0.0], "bodies": [0], "points_W": [(0, 0, 0)]},
     "RobotChecker.self_filter": lambda: {"points": np.eye(3), "Q": [0.0]},
     "RobotChecker.from_scene": lambda: {"scene": scene()},
     "RobotChecker.attach": lambda: {"name": "cup", "link": robot().links[-1], "shape": collide.Sphere(0.01)},

@@ -200,7 +200,8 @@ GIVEN = {
     "partitions": "mesh = collide.Mesh(*collide.tessellate(collide.Box((1, 1, 1)))[:2]); points = np.zeros((2, 3))\n"
     "low, high = (-2, -2, -2), (2, 2, 2)",
     "planar": "from collide.polytopes import planar_pose\nX_WBs = np.array([planar_pose((x, 0)) for x in (1, 5)])",
-    "derivatives": "",
+    "derivatives": "robot = collide.Robot.load('two_links.urdf'); world = collide.World(); Q = np.array([[0.1], [0.4]])\n"
+    "world.add(collide.Sphere(0.1), collide.pose((0.5, 0.5, 0)), name='ball')",
     "polytopes": "",
     "shapes": "",
     "robots": "X_LS = np.eye(4); world = collide.World(); Q = Q0 = np.zeros((2, 1)); Q1 = Q + 0.1; q = Q[0]\n"

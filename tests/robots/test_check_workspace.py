@@ -124,7 +124,7 @@ def test_gradients_of_rows_that_have_one():
     rows["certified"][2], rows["a"][3] = False, NONE
     out, of = np.full((4, 1), 7.0), np.arange(4)
     distance_gradients(
-        space.address, address_of(q), 1, 4, address_of(of), 4, address_of(checker.robot.moves), address_of(rows),
+        space.address, address_of(q), 1, 4, address_of(of), 4, address_of(checker.robot.moves), address_of(rows), 0,
         address_of(out),
     )
     assert np.allclose(out[:2, 0], (-1.0, 1.0), atol=1e-12) and np.isnan(out[2:]).all()

@@ -25,6 +25,7 @@ from collide.results import PAIR_DTYPE
 from collide.robots import distance_batches
 from collide.robots.check_workspace import CheckWorkspace
 from collide.robots.distance_batches import DistanceQuestion, _are_among, _put_nearer, _slots_of, measure_piece
+from collide.robots.distance_gradients import WITNESS
 from collide.robots.kinematic_tree import Joint
 from collide.robots.robot import LinkShape, Robot
 from collide.robots.robot_distances import NEAREST_DTYPE
@@ -306,7 +307,7 @@ def measured(checker, q, limit: float = np.inf):
     q = np.array(q, dtype=float)
     rows, gradient = np.zeros(len(q), dtype=NEAREST_DTYPE), np.zeros(q.shape)
     space = CheckWorkspace(checker.robot, checker.setting)
-    measure_piece(checker, space, q, rows, gradient, DistanceQuestion(limit))
+    measure_piece(checker, space, q, rows, gradient, np.empty((len(q), WITNESS)), DistanceQuestion(limit))
     return rows, gradient
 
 

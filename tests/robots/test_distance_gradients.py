@@ -340,3 +340,97 @@ def test_gradients_at_kinks_lie_between_the_slopes_of_both_sides():
     assert counts["kink"] >= 10 and counts["gap"] + counts["overlap"] + counts["kink"] == 20, counts
     measured = checker.distances(Q, per="pair")
     assert (np.abs(measured.gradient[:, 0]) > 0.999).all()  # along x nothing is a kink
+
+
+def moved(X: np.ndarray, twist: np.ndarray) -> np.ndarray:
+    """A pose turned about the origin of W, then shifted, to second order in (6,) small numbers."""
+    turn = np.cross(twist[:3], np.eye(3)).T
+    return np.block([[np.eye(3) + turn + turn @ turn / 2, twist[3:, None]], [np.zeros((1, 3)), np.eye(1)]]) @ X
+
+
+def test_poses_of_bodies_around_and_of_the_base():
+    """Beside differences of distances by a World that moves as a whole, or of which a body moves: moving the base is
+    moving all that is around the other way."""
+    n_base = n_body = 0
+    for seed in range(6):
+        rng = rng_of("poses of bodies around", seed)
+        robot, world = random_robot(rng, n_links=4, size=0.2), boxes_around(rng, 3)
+        checker = collide.RobotChecker(robot, world)
+        Q = random_configurations(rng, robot, 6)
+        measured = checker.distances(Q, between="world")
+        known = ~np.isnan(measured.gradient).any(axis=1)
+        assert np.array_equal(known, ~np.isnan(measured.d_pose_b).any(axis=1))
+        poses = {i: world.body(i).X_WB.copy() for i in world.ids}
+        for k in np.flatnonzero(known).tolist():
+            for whole in (True, False):
+                bodies = poses if whole else [i for i in poses if world.body(i).name == measured.names[k][1]]
+                sides = np.empty((2, 6))
+                for side, step in enumerate((STEP, -STEP)):
+                    for j in range(6):
+                        for i in bodies:
+                            world.set_pose(i, moved(poses[i], step * np.eye(6)[j]))
+                        row = checker.distances(Q[k], between="world")
+                        sides[side, j] = row.distance[0] if row.names == [measured.names[k]] else np.nan
+                        for i in bodies:
+                            world.set_pose(i, poses[i])
+                slopes = (sides[0] - sides[1]) / (2 * STEP)
+                if np.isnan(slopes).any():
+                    continue
+                told = -measured.d_base[k] if whole else measured.d_pose_b[k]
+                assert np.abs(slopes - told).max() <= 2e-4 * (1 + np.abs(slopes).max()), (seed, k, whole, slopes, told)
+                n_base, n_body = n_base + whole, n_body + (not whole)
+    assert n_base >= 15 and n_body >= 15
+
+
+def test_base_moves_no_two_links_apart():
+    robot = random_robot(rng_of("base"), n_links=5, size=0.2)
+    measured = collide.RobotChecker(robot).distances(random_configurations(rng_of("base q"), robot, 20), per="pair")
+    known = ~np.isnan(measured.gradient).any(axis=1)
+    assert known.sum() > 20 and not measured.d_base[known].any() and np.isnan(measured.d_base[~known]).all()
+
+
+def test_jacobians_of_points():
+    """Beside differences of link poses; and with the normal they are the gradients of distances."""
+    asked = 0
+    for seed in range(6):
+        rng = rng_of("jacobians", seed)
+        robot, world = random_robot(rng, n_links=5, size=0.2), boxes_around(rng, 3)
+        checker = collide.RobotChecker(robot, world)
+        Q = random_configurations(rng, robot, 5)
+        bodies = rng.integers(len(checker.bodies), size=5)
+        points = rng.normal(size=(5, 3))
+        told = checker.point_jacobians(Q, bodies, points)
+        names = [link if link in robot.links else None for link in (checker.bodies[b] for b in bodies)]
+        for k, name in enumerate(names):
+            if name is None:
+                continue
+            link = robot.links.index(name)
+            fixed = np.append(points[k], 1.0)
+            X_WL = robot.link_poses(Q[k])[0, link]
+            steps = STEP * np.eye(robot.dof)
+            moved_points = [
+                [robot.link_poses(Q[k] + sign * step)[0, link] @ np.linalg.solve(X_WL, fixed) for step in steps]
+                for sign in (1.0, -1.0)
+            ]
+            slopes = ((np.array(moved_points[0]) - moved_points[1]) / (2 * STEP))[:, :3].T
+            assert np.abs(slopes - told[k]).max() <= 1e-5 * (1 + np.abs(slopes).max()), (seed, k)
+            asked += 1
+        measured = checker.distances(Q, between="world")
+        known = ~np.isnan(measured.gradient).any(axis=1) & ~measured.hit & (measured.distance > 1e-3)
+        J = checker.point_jacobians(Q[known], measured.a[known], measured.point_a[known])
+        by_points = -np.einsum("ki,kij->kj", measured.normal[known], J)
+        assert np.allclose(by_points, measured.gradient[known], atol=1e-6)
+    assert asked >= 15
+
+
+@pytest.mark.parametrize(
+    ("bodies", "points", "said"),
+    [
+        ([9], [(0, 0, 0)], "is no body"), ([0], [(0, 0)], "points_W must be"), ([0.5], [(0, 0, 0)], "integers"),
+        ([0, 0, 0], [(0, 0, 0)] * 2, "lengths do not match"),
+    ],
+)
+def test_jacobians_of_what_is_no_point(bodies, points, said):
+    checker = collide.RobotChecker(slider(collide.Sphere(0.1)))
+    with pytest.raises(collide.InvalidArgument, match=said):
+        checker.point_jacobians([0.0], bodies, points)
