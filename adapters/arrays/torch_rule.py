@@ -1,20 +1,22 @@
-"""PyTorch's rule for the distance of two bodies: an autograd function."""
+"""PyTorch's rules for distances of two bodies and of robots: autograd functions."""
 
 from __future__ import annotations
 
+import math
 from functools import cache
 from typing import Any
 
 import numpy as np
 
 from collide.adapters.arrays.pose_gradients import distances_with_gradients
-from collide.errors import InvalidPose, MissingExtra
+from collide.adapters.arrays.robot_gradients import robot_gradients
+from collide.errors import CollideError, InvalidArgument, InvalidPose, MissingExtra
 from collide.shapes.shape import Shape
 
 
 @cache
-def _rule() -> tuple[Any, Any]:
-    """(the module torch, the autograd function)."""
+def _rules() -> tuple[Any, Any, Any]:
+    """(the module torch, the autograd functions of pairs and of robots)."""
     try:
         import torch
     except ImportError:
@@ -42,7 +44,23 @@ def _rule() -> tuple[Any, Any]:
             ]
             return None, None, *summed, None
 
-    return torch, Distance
+    class RobotDistances(torch.autograd.Function):
+        @staticmethod
+        def forward(ctx: Any, checker, Q, question):
+            values, gradient, of = robot_gradients(checker, np.asarray(Q.detach(), dtype=np.float64), question)
+            ctx.save_for_backward(torch.from_numpy(gradient).to(Q.dtype), torch.from_numpy(of))
+            ctx.shape = Q.shape
+            return torch.from_numpy(values).to(Q.dtype)
+
+        @staticmethod
+        @torch.autograd.function.once_differentiable
+        def backward(ctx: Any, by_distance):
+            gradient, of = ctx.saved_tensors
+            rows = torch.where(by_distance[:, None] == 0, 0.0, by_distance[:, None] * gradient)
+            summed = torch.zeros(ctx.shape[-2:] if len(ctx.shape) == 2 else (1, *ctx.shape), dtype=gradient.dtype)
+            return None, summed.index_add(0, of, rows).reshape(ctx.shape), None
+
+    return torch, Distance, RobotDistances
 
 
 def torch_distance(A, B, X_WA, X_WB, *, subgradient: bool = False):
@@ -55,11 +73,31 @@ def torch_distance(A, B, X_WA, X_WB, *, subgradient: bool = False):
     Returns (N,) [m], or () of two single poses of two shapes. Gradients are of first order; by entries of a rotation R
     tangential, ½ [g]× R (`pose_gradients.py`). Raises InvalidPose for tensors on other devices or of other types.
     """
-    torch, distance = _rule()
+    torch, distance, _ = _rules()
     for name, X in (("X_WA", X_WA), ("X_WB", X_WB)):
-        if not isinstance(X, torch.Tensor) or X.dtype not in (torch.float32, torch.float64):
-            got = X.dtype if isinstance(X, torch.Tensor) else type(X).__name__
-            raise InvalidPose(f"{name} must be a tensor of float32 or float64, which carry gradients, got {got}")
-        if X.device.type != "cpu":
-            raise InvalidPose(f"{name} is on the device {X.device}: hand in {name}.cpu(), through which gradients pass")
+        _check(torch, name, X, InvalidPose)
     return distance.apply(A, B, X_WA, X_WB, subgradient)
+
+
+def torch_robot_distances(checker, Q, *, max_distance: float = math.inf, per: str = "robot", between: str = "all"):
+    """Distances of a robot as a tensor with gradients by q.
+
+    checker : a `collide.RobotChecker`.   Q : (N, dof) or (dof,) tensor of floats in the processor's memory.
+    max_distance, per, between : as of `RobotChecker.distances`.
+
+    Returns (M,) [m], the rows of `RobotChecker.distances` in order: N, N bodies, or all pairs, as ``per`` says. A row
+    beyond ``max_distance`` is this distance, with a gradient of 0. Where a distance has no derivative its gradient is
+    NaN, unless what is handed back for the row is 0: a hinge on the clearance meets no NaN of far pairs. Raises
+    InvalidArgument for tensors on other devices or of other types.
+    """
+    torch, _, distances = _rules()
+    _check(torch, "Q", Q, InvalidArgument)
+    return distances.apply(checker, Q, {"max_distance": max_distance, "per": per, "between": between})
+
+
+def _check(torch: Any, name: str, X: Any, error: type[CollideError]) -> None:
+    if not isinstance(X, torch.Tensor) or X.dtype not in (torch.float32, torch.float64):
+        got = X.dtype if isinstance(X, torch.Tensor) else type(X).__name__
+        raise error(f"{name} must be a tensor of float32 or float64, which carry gradients, got {got}")
+    if X.device.type != "cpu":
+        raise error(f"{name} is on the device {X.device}: hand in {name}.cpu(), through which gradients pass")

@@ -8,6 +8,8 @@ import pytest
 import collide
 from collide.adapters.arrays.pose_gradients import distances_with_gradients
 from collide.errors import InvalidPose
+from collide.robots.kinematic_tree import Joint
+from collide.robots.robot import LinkShape
 
 ROUND = collide.Ellipsoid((0.3, 0.2, 0.5)), collide.Capsule(0.1, 0.4)
 EDGED = collide.ConvexHull(np.random.default_rng(3).normal(size=(14, 3))), collide.Box((0.6, 0.5, 0.4))
@@ -177,3 +179,75 @@ def test_jax_refuses_by_name():
     for bad, words in ((xp.eye(4, dtype=int), "got int"), (xp.eye(4)[0], r"\(N, 4, 4\)"), ([1.0], "got list")):
         with pytest.raises(InvalidPose, match=f"X_WA must be.*{words}"):
             jax_distance(*ROUND, bad, jax.numpy.eye(4))
+
+
+# --- robots ----------------------------------------------------------------------------------------
+
+
+def arm_of_two() -> collide.RobotChecker:
+    """Two links that turn beside a ball and a box; every pair is a gap of round or edged bodies."""
+    joints = [
+        Joint("shoulder", "revolute", "base", "upper", axis=np.array([0, 0, 1.0]), lower=-3.0, upper=3.0),
+        Joint("elbow", "revolute", "upper", "lower", collide.pose((0.5, 0, 0)), np.array([0, 1.0, 0]), -2.0, 2.0),
+    ]
+    along = collide.pose((0.25, 0, 0), rpy=(0, np.pi / 2, 0))
+    upper, lower = (LinkShape(S, along, None, "") for S in (collide.Capsule(0.05, 0.3), collide.Cylinder(0.04, 0.3)))
+    shapes = {"upper": [upper], "lower": [lower]}
+    world = collide.World()
+    world.add(collide.Sphere(0.1), collide.pose((0.4, 0.6, 0.3)), name="ball")
+    world.add(collide.Box((0.2, 0.2, 0.2)), collide.pose((0.7, -0.5, 0.4), rpy=(0.3, 0.2, 0.1)), name="box")
+    return collide.RobotChecker(collide.Robot("arm", ["base", "upper", "lower"], joints, shapes), world)
+
+
+QS = np.random.default_rng(7).uniform(-0.8, 0.8, (5, 2))
+
+
+def test_torch_of_robots():
+    torch = library("torch")
+    from collide.adapters.arrays import torch_robot_distances
+
+    checker = arm_of_two()
+    Q = torch.tensor(QS, requires_grad=True)
+    for per, n in (("robot", 5), ("link", 10), ("pair", 20)):
+        told = torch_robot_distances(checker, Q, per=per, between="world")
+        measured = checker.distances(QS, per=per, between="world")
+        assert told.shape == (n,) and np.array_equal(told.detach(), measured.distance)
+        assert torch.autograd.gradcheck(
+            lambda Q, per=per: torch_robot_distances(checker, Q, per=per, between="world"), (Q,), atol=1e-5
+        )
+    limit = float(np.median(checker.distances(QS, per="link", between="world").distance))
+    near = torch_robot_distances(checker, Q, per="link", between="world", max_distance=limit)
+    assert (near == limit).sum() == 5
+    (slope,) = torch.autograd.grad(torch.relu(0.9 * limit - near).sum(), Q)
+    assert torch.isfinite(slope).all() and slope.any()
+    (single,) = torch.autograd.grad(torch_robot_distances(checker, Q[0]).sum(), Q)
+    assert single[0].any() and not single[1:].any()
+
+
+def test_jax_of_robots():
+    jax = library("jax")
+    from jax.test_util import check_grads
+
+    from collide.adapters.arrays import jax_robot_distances
+
+    checker = arm_of_two()
+    before = jax.config.jax_enable_x64
+    jax.config.update("jax_enable_x64", True)
+    try:
+        Q = jax.numpy.asarray(QS)
+        told = jax.jit(lambda Q: jax_robot_distances(checker, Q, per="link", between="world"))(Q)
+        assert np.array_equal(np.asarray(told), checker.distances(QS, per="link", between="world").distance)
+        for per in ("robot", "link"):
+            check_grads(lambda Q, per=per: jax_robot_distances(checker, Q, per=per, between="world"), (Q,), 1, ["rev"])
+        with pytest.raises(collide.InvalidArgument, match="per must be"):
+            jax_robot_distances(checker, Q, per="pair")
+    finally:
+        jax.config.update("jax_enable_x64", before)
+
+
+def test_tensors_of_robots_that_carry_no_gradient_are_refused():
+    torch = library("torch")
+    from collide.adapters.arrays import torch_robot_distances
+
+    with pytest.raises(collide.InvalidArgument, match="Q must be a tensor of float32 or float64"):
+        torch_robot_distances(arm_of_two(), torch.zeros(2, dtype=torch.int64))

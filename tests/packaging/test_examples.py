@@ -22,7 +22,7 @@ NEEDS = {
     "29_record_and_compare": "pybullet",
     **dict.fromkeys(("18_certified_planning", "19_nearest_obstacles", "20_reachable_positions"), "yaml"),
     "32_depth_camera": "yaml", "33_optimised_trajectory": "yaml scipy",
-    "34_free_box": "yaml",
+    "34_free_box": "yaml", "35_clearance_of_an_arm": "scipy", "37_learn_from_contacts": "torch",
 }
 #: What hosts print when they are imported.
 HOSTS_SAY = ("pybullet build time", "Warp CUDA warning")
@@ -54,6 +54,9 @@ SHOWS = {
         "straight: 10 of 32 waypoints collide", "optimised: 0 of 32 waypoints collide", "31 of 31 motions proven free",
         "within the clearance in",
     ],
+    "35_clearance_of_an_arm": ["planned: least distance +0.0", "least distance +0.06", "21 of 21 motions proven"],
+    "36_fit_a_grasp": ["after 6 steps", "normals 0.0000 degrees off"],
+    "37_learn_from_contacts": ["40 touches; the box was 217", "balls are 0.100 mm"],
     "34_free_box": ["box grown in", "0 of 100000 samples of the box collide", "path of 49 segments", "49 proven free"],
     "32_depth_camera": [
         "4688 points seen; the straight motion collides at", "a path of 4 motions, 4 of them proven free",
@@ -200,8 +203,8 @@ GIVEN = {
     "partitions": "mesh = collide.Mesh(*collide.tessellate(collide.Box((1, 1, 1)))[:2]); points = np.zeros((2, 3))\n"
     "low, high = (-2, -2, -2), (2, 2, 2)",
     "planar": "from collide.polytopes import planar_pose\nX_WBs = np.array([planar_pose((x, 0)) for x in (1, 5)])",
-    "derivatives": "robot = collide.Robot.load('two_links.urdf'); world = collide.World(); Q = np.array([[0.1], [0.4]])\n"
-    "world.add(collide.Sphere(0.1), collide.pose((0.5, 0.5, 0)), name='ball')",
+    "derivatives": "robot = collide.Robot.load('two_links.urdf'); Q = np.array([[0.1], [0.4]])\n"
+    "world = collide.World(); world.add(collide.Sphere(0.1), collide.pose((0.5, 0.5, 0)), name='ball')",
     "polytopes": "",
     "shapes": "",
     "robots": "X_LS = np.eye(4); world = collide.World(); Q = Q0 = np.zeros((2, 1)); Q1 = Q + 0.1; q = Q[0]\n"
