@@ -17,8 +17,7 @@ print("within 5 mm:", collide.collide(shelf, box, np.eye(4), X_WBs, security_mar
 r = collide.distance(shelf, box, np.eye(4), X_WBs[1])
 print(f"{r.distance * 1e3:.3f} mm, known by a {r.how}: {r.how.meaning}")
 can = collide.distance(collide.Cylinder(0.05, height=0.1), shelf, collide.pose((0, 0, 0.06)), np.eye(4))
-if can.how is collide.How.UNDECIDED:
-    print(f"the can touches the shelf: {can.how.meaning}")
+print(f"the can on the shelf is {can.distance:.1e} m from it, by {can.how.meaning}")
 
 # A pair of shapes at every pose, and their contacts pair by pair.
 library = collide.ShapeSet([shelf, box, collide.Sphere(0.05)])

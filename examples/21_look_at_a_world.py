@@ -27,7 +27,7 @@ def dance(t: float) -> collide.World:
 
 def move(world: collide.World, t: float) -> None:
     for k in range(12):
-        a = 0.5 * t + 0.7 * k
+        a = (0.5 * t + 0.7 * k) % (2 * np.pi)
         xyz = 0.7 * np.cos(a), 0.45 * np.sin(1.3 * a), 0.25 + 0.2 * np.sin(2 * a + k)
         world.set_pose(k + 1, collide.pose(xyz, rpy=(a, 0.5 * a, 0)))
 

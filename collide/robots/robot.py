@@ -167,9 +167,9 @@ class Robot:
         Parameters
         ----------
         path : str or Path
-            The URDF file; or an MJCF file, read by the package mujoco (extra ``[mujoco]``): bodies are links, the
-            root is the world, pairs left out by MuJoCo's filters are never tested, keyframes are states; or an SDFormat
-            file with a single robot.
+            The URDF file, or ``package://`` and a file in a package; or an MJCF file, read by the package mujoco (extra
+            ``[mujoco]``): bodies are links, the root is the world, pairs left out by MuJoCo's filters are never tested,
+            keyframes are states; or an SDFormat file with a single robot.
         srdf : str, Path or bool, optional
             The SRDF file. ``None`` looks beside the robot's file, ``False`` does without. An SRDF adds to MuJoCo's
             filters.

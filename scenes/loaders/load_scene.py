@@ -22,6 +22,7 @@ from collide.scenes.loaders import mjcf, moveit, moveit_text, scene_yaml, sdform
 from collide.scenes.loaders.documents import read_document
 from collide.scenes.loaders.fields import read_each
 from collide.scenes.loaders.mesh_shapes import part_shape
+from collide.scenes.loaders.resources import named
 from collide.scenes.loaders.robot_file import load_robot
 from collide.scenes.loaders.xml_text import parse_xml
 
@@ -64,7 +65,7 @@ def load(
     ----------
     path : str or Path
         A URDF, an MJCF or an SDFormat file (an SRDF beside it is read too), a MoveIt planning scene, a mesh, a scene
-        file (docs/scene-format.md), or the name of a shipped scene.
+        file (docs/scene-format.md), ``package://`` and a file in a package, or the name of a shipped scene.
     *more_paths
         Further files of the same scene.
     state : str, Path or mapping of str to float, optional
@@ -100,7 +101,8 @@ def load(
     factor = 1.0 if scale is None else scale_factor("scale", scale, SceneError)
     options = Options(robot, srdf, meshes, tuple(_paths(package_path)), factor, missing_meshes)
     mesh_loader.check_meshes_option(meshes)
-    parts = read_each((path, *more_paths), lambda path_or_name: _load_one(_resolve(path_or_name), options))
+    given = [named(path_or_name, options.package_path) for path_or_name in (path, *more_paths)]
+    parts = read_each(given, lambda path_or_name: _load_one(_resolve(path_or_name), options))
     scene = parts[0] if len(parts) == 1 else _together(parts)
     if state is not None:
         scene = _in_state(scene, state)

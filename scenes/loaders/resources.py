@@ -60,6 +60,15 @@ def find(filename: str, beside: Path, package_path: Iterable = (), *, element: s
     raise NotFound(f'cannot find "{cut(filename, 240)}"{advice}. Searched:{places}', path=beside, element=element)
 
 
+def named(path, package_path: Iterable = ()):
+    """The path, or the file that a name such as ``package://panda/panda.urdf`` points to, as from the working folder.
+
+    Raises NotFound, and SceneError for remote files.
+    """
+    is_name = isinstance(path, str) and "://" in path
+    return find(path, Path.cwd() / "named by the caller", package_path) if is_name else path
+
+
 def _split(filename: str, beside: Path, element: str | None) -> tuple[str, str]:
     name = filename.strip().replace("\\", "/")
     if "://" not in name:

@@ -8,6 +8,7 @@ from collide.base import argument_checks as checks
 from collide.errors import SceneError
 from collide.robots.robot import Robot
 from collide.scenes.loaders import mjcf, sdformat, urdf
+from collide.scenes.loaders.resources import named
 from collide.scenes.loaders.xml_text import parse_xml
 
 
@@ -20,7 +21,7 @@ def load_robot(
     MuJoCo looks for meshes itself, beside the file, and needs all of them: ``package_path`` and ``missing_meshes``
     are for URDFs.
     """
-    path = checks.file_path("Robot.load: path", path, SceneError)
+    path = checks.file_path("Robot.load: path", named(path, package_path), SceneError)
     root = None if Path(path).suffix.lower() == ".urdf" else parse_xml(Path(path), [])
     if root is not None and root.tag == "mujoco":
         return mjcf.load_robot(path, srdf, meshes=meshes, seconds=seconds)
