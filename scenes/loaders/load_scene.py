@@ -101,8 +101,8 @@ def load(
     factor = 1.0 if scale is None else scale_factor("scale", scale, SceneError)
     options = Options(robot, srdf, meshes, tuple(_paths(package_path)), factor, missing_meshes)
     mesh_loader.check_meshes_option(meshes)
-    given = [named(path_or_name, options.package_path) for path_or_name in (path, *more_paths)]
-    parts = read_each(given, lambda path_or_name: _load_one(_resolve(path_or_name), options))
+    files = [named(path_or_name, options.package_path) for path_or_name in (path, *more_paths)]
+    parts = read_each(files, lambda path_or_name: _load_one(_resolve(path_or_name), options))
     scene = parts[0] if len(parts) == 1 else _together(parts)
     if state is not None:
         scene = _in_state(scene, state)

@@ -420,7 +420,7 @@ PLANNING = {
     "allowed_collision_matrix": {"entry_names": ["a", "b"], "entry_values": [[True, False], {"enabled": [False, True]}],
                                  "default_entry_names": ["a"], "default_entry_values": [True]},
     "link_padding": [{"link_name": "a", "padding": 0.1}],
-    "world": {"octomap": {"octomap": {"data": [1]}}, "collision_objects": [{
+    "world": {"octomap": {"octomap": {"id": "OcTree", "resolution": 0.1, "binary": True, "data": [1, 0]}}, "collision_objects": [{
         "id": "o", "header": {"frame_id": "f"}, "operation": 0, "pose": {"position": {"x": 1, "y": 0, "z": 0}, "orientation": [0, 0, 0, 1]},
         "meshes": [{"vertices": [{"x": 0, "y": 0, "z": 0}, {"x": 1}, {"y": 1}], "triangles": [{"vertex_indices": [0, 1, 2]}]}], "mesh_poses": [{}],
         "planes": [{"coef": [0, 0, 1, 0]}], "plane_poses": [{}], "primitives": [{"type": "sphere", "dimensions": [1]}],
