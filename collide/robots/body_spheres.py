@@ -49,7 +49,7 @@ def spheres_of(body: RobotBody) -> BodySpheres:
     """Those of a body of a robot, whose shape is a `Compound` of collision elements."""
     items = body.shape.items if isinstance(body.shape, Compound) else [(body.shape, np.eye(4))]
     count = max(1, _COUNT // len(items))
-    made = [(_spheres_of_shape(shape)(count), X) for shape, X in items]
+    made = [(_spheres_of_shape(shape, count), X) for shape, X in items]
     outer, inner = (
         np.concatenate([_moved(spheres[k], X, sign) for spheres, X in made]) for k, sign in ((0, 1.0), (1, -1.0)))
     is_exact = all(spheres.is_exact for spheres, _ in made)
@@ -66,16 +66,16 @@ def _moved(spheres: np.ndarray, X: np.ndarray, sign: float) -> np.ndarray:
 
 
 @kept_with_shape("_link_spheres")
-def _spheres_of_shape(shape: Shape):
-    """A function of how many spheres are wanted, which keeps what was made."""
-    made: dict[int, BodySpheres] = {}
+def _spheres_by_count(shape: Shape) -> dict[int, BodySpheres]:
+    """What was made, by the number of spheres wanted."""
+    return {}
 
-    def of(count: int) -> BodySpheres:
-        if count not in made:
-            made[count] = _made(shape, count)
-        return made[count]
 
-    return of
+def _spheres_of_shape(shape: Shape, count: int) -> BodySpheres:
+    made = _spheres_by_count(shape)
+    if count not in made:
+        made[count] = _made(shape, count)
+    return made[count]
 
 
 def are_spheres(shape: Shape) -> bool:

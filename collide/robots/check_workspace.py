@@ -39,7 +39,7 @@ class CheckWorkspace:
     """
 
     def __init__(self, robot: Robot, setting: Setting):
-        self.robot, self.setting = robot, setting  # kernels read what they hold
+        self.robot, self.setting = robot, _without_spares(setting)  # kernels read what they hold
         self.slots: dict = {}
         tables, around, joints = setting.tables, setting.surroundings, robot.joint_table
         n_bodies, n_parts, n_around = len(tables.bodies), len(tables.poses), len(around.packed)
@@ -96,7 +96,7 @@ class CheckWorkspace:
 
     def _carry(self, setting: Setting) -> None:
         """Take over attached objects and tested pairs. O(parts of objects)."""
-        self.setting, tables, header = setting, setting.tables, self.header
+        self.setting, tables, header = _without_spares(setting), setting.tables, self.header
         first, shape, skew = tables.n_parts, len(tables.table.packed), 0.0
         for number, rows in enumerate(setting.objects, tables.n_bodies):
             made, n = rows.tables, rows.n_parts
@@ -145,10 +145,15 @@ class CheckWorkspace:
             self._seen = setting.seen
             if moved == FIELD_MOVED:
                 self._walk_fields(setting)
-        before, self.setting = self.setting, setting
+        before, self.setting = self.setting, _without_spares(setting)
         if setting.filters is not before.filters or setting.maps is not before.maps:
             self._carry(setting)
         return True
+
+    def stands_at(self, setting: Setting) -> bool:
+        """Whether there is nothing for `stand` to do."""
+        mine = self.setting
+        return mine.seen is setting.seen and mine.filters is setting.filters and mine.maps is setting.maps
 
     def tables(self) -> dict[str, np.ndarray]:
         """Tables of robot and surroundings as kernels read them, by name (`checker_file.py`)."""
@@ -344,3 +349,9 @@ class MotionWorkspace:
 def _reach_of(box: list[float]) -> float:
     """How far a body reaches in its link [m]; 0 without an end."""
     return sum(map(abs, box)) if max(box) < UNBOUNDED_HALF else 0.0
+
+
+def _without_spares(setting: Setting) -> Setting:
+    """A setting that a workspace may hold: the list of spare workspaces holds the workspace, and a circle would keep
+    shapes of a checker that is gone until a search for garbage."""
+    return setting._replace(spare=[])

@@ -418,7 +418,7 @@ class CheckerScene:
             space = setting.spare.pop()
         except IndexError:  # all are in use: another thread may have taken the last
             return CheckWorkspace(self.robot, setting)
-        return space if space.setting is setting or space.stand(setting) else CheckWorkspace(self.robot, setting)
+        return space if space.stands_at(setting) or space.stand(setting) else CheckWorkspace(self.robot, setting)
 
     def _as_of_now(self) -> Self:
         """The checker among the bodies as they stand now; changes of the World during a question do not reach it."""
