@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from collide.hull_levels.nested_hulls import NestedHull, nested_hulls
     from collide.kernels.library import include_folder as get_include
     from collide.kernels.library import library_path as get_library
+    from collide.motion.impact_derivatives import ImpactDerivatives, impact_derivatives
     from collide.motion.impact_query import moved_poses, poses_in_motion, time_of_impact
     from collide.motion.impact_rows import TimeOfImpact
     from collide.pairs.query import collide, distance
@@ -136,6 +137,7 @@ _HOMES = {
     "collide.surface_queries.signed_distances": ("SignedDistances", "signed_distances"),
     "collide.surface_queries.facet_pairs": ("FacetPairs", "SelfCollisions", "facet_pairs", "self_collisions"),
     "collide.papers.hierarchies.hierarchy_queries": ("walk",),
+    "collide.motion.impact_derivatives": ("ImpactDerivatives", "impact_derivatives"),
     "collide.motion.impact_query": ("moved_poses", "poses_in_motion", "time_of_impact"),
     "collide.motion.impact_rows": ("TimeOfImpact",),
     "collide.papers.polytopes.convex_polygon": ("ConvexPolygon",),
@@ -195,18 +197,19 @@ __all__ = [
     "CertifiedBoxes", "CertifiedEdges", "CertifiedMotion", "CollideError", "Compound", "Cone", "ConfigurationObstacle",
     "Contacts", "ConvexCells", "ConvexHull", "ConvexParts", "ConvexPolygon", "Cylinder", "DrawnConfigurations",
     "Ellipsoid", "EnclosingSpheres", "FacetPairs", "GridDistances", "HPolytope", "Halfspace", "HeightField", "How",
-    "InvalidArgument", "InvalidPose", "InvalidShape", "LinkPair", "Located", "Mesh", "MissingExtra", "MotionPlan",
-    "NestedHull", "OcTree", "OcTreeLeaves", "OverlapVolume", "Overlay", "PairDerivatives", "PairResult",
-    "PartitionSize", "PieceAudit", "PlanarObstacle", "Plane", "PointCloud", "Portals", "Proposal", "RayHits",
-    "RepairedMesh", "Robot", "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts",
-    "ShapeSet", "SignedDistanceGrid", "SignedDistances", "SmoothedDistances", "SoftMinimum", "SpacePartition", "Sphere",
-    "Spline", "SweepResults", "SweptMesh", "TetMesh", "TimeOfImpact", "Uniqueness", "UnknownBody", "UnsupportedQuery",
-    "VoxelGrid", "World", "WorldBatch", "WorldBatchResult", "WorldHits", "WorldResult", "audit_pieces", "boolean",
-    "certify", "collide", "combine", "configuration_obstacle", "contacts", "contains", "distance", "enclosing_spheres",
-    "facet_pairs", "get_include", "get_library", "moved_poses", "nested_hulls", "overlap_volume", "overlapping_cells",
-    "overlay", "plan", "pose", "poses", "poses_in_motion", "propose_disabled_pairs", "raycast", "read_sweep",
-    "repaired", "self_collisions", "self_overlapping_cells", "shape_cast", "signed_distances", "smoothed_distances",
-    "soft_minimum", "sweep", "tessellate", "time_of_impact", "to_library", "verify", "walk",
+    "ImpactDerivatives", "InvalidArgument", "InvalidPose", "InvalidShape", "LinkPair", "Located", "Mesh",
+    "MissingExtra", "MotionPlan", "NestedHull", "OcTree", "OcTreeLeaves", "OverlapVolume", "Overlay", "PairDerivatives",
+    "PairResult", "PartitionSize", "PieceAudit", "PlanarObstacle", "Plane", "PointCloud", "Portals", "Proposal",
+    "RayHits", "RepairedMesh", "Robot", "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions", "Shape",
+    "ShapeCasts", "ShapeSet", "SignedDistanceGrid", "SignedDistances", "SmoothedDistances", "SoftMinimum",
+    "SpacePartition", "Sphere", "Spline", "SweepResults", "SweptMesh", "TetMesh", "TimeOfImpact", "Uniqueness",
+    "UnknownBody", "UnsupportedQuery", "VoxelGrid", "World", "WorldBatch", "WorldBatchResult", "WorldHits",
+    "WorldResult", "audit_pieces", "boolean", "certify", "collide", "combine", "configuration_obstacle", "contacts",
+    "contains", "distance", "enclosing_spheres", "facet_pairs", "get_include", "get_library", "impact_derivatives",
+    "moved_poses", "nested_hulls", "overlap_volume", "overlapping_cells", "overlay", "plan", "pose", "poses",
+    "poses_in_motion", "propose_disabled_pairs", "raycast", "read_sweep", "repaired", "self_collisions",
+    "self_overlapping_cells", "shape_cast", "signed_distances", "smoothed_distances", "soft_minimum", "sweep",
+    "tessellate", "time_of_impact", "to_library", "verify", "walk",
 ]
 
 

@@ -51,7 +51,9 @@ def spheres_of(body: RobotBody) -> BodySpheres:
     count = max(1, _COUNT // len(items))
     made = [(_spheres_of_shape(shape, count), X) for shape, X in items]
     outer, inner = (
-        np.concatenate([_moved(spheres[k], X, sign) for spheres, X in made]) for k, sign in ((0, 1.0), (1, -1.0)))
+        np.concatenate([_moved((spheres.outer, spheres.inner)[k], X, sign) for spheres, X in made])
+        for k, sign in ((0, 1.0), (1, -1.0))
+    )
     is_exact = all(spheres.is_exact for spheres, _ in made)
     return BodySpheres(outer, inner if is_exact else inner[inner[:, 3] > 0.0], is_exact)
 

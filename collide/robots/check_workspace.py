@@ -352,6 +352,6 @@ def _reach_of(box: list[float]) -> float:
 
 
 def _without_spares(setting: Setting) -> Setting:
-    """A setting that a workspace may hold: the list of spare workspaces holds the workspace, and a circle would keep
-    shapes of a checker that is gone until a search for garbage."""
+    """The setting for a workspace to hold: a list of spare workspaces with this workspace would close a circle, and
+    shapes would outlive their checker until a search for garbage."""
     return setting._replace(spare=[])

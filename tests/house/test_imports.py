@@ -66,7 +66,7 @@ ROOMS = {
     },
     "motion": {
         "errors", "base", "kernels", "transforms", "results", "numerics", "support", "mesh", "shapes", "lowering",
-        "narrowphase", "pairs",
+        "narrowphase", "derivatives", "pairs",
     },
     "surface_queries": {
         "errors", "base", "transforms", "results", "numerics", "mesh", "fields", "shapes", "lowering", "narrowphase",

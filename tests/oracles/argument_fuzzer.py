@@ -267,6 +267,9 @@ GOOD: dict[str, Callable[[], dict[str, Any]]] = {
     "Robot": lambda: {"name": "r", "links": ["a"], "joints": []},
     "RobotChecker": lambda: {"robot": robot()},
     "enclosing_spheres": lambda: {"shape": collide.Box((1.0, 1.0, 1.0))},
+    "impact_derivatives": lambda: {
+        "A": BOX, "B": collide.Sphere(1.0), "X_WA0": EYE, "X_WA1": EYE, "X_WB0": collide.pose((3, 0, 0)), "X_WB1": EYE,
+    },
     "nested_hulls": lambda: {"shape": collide.Box((1.0, 1.0, 1.0)), "sizes": [8, 16]},
     "audit_pieces": lambda: {"shape": collide.Box((1.0, 1.0, 1.0)), "pieces": collide.Box((1.0, 1.0, 1.1))},
     "plan": lambda: {
@@ -568,6 +571,8 @@ EXCUSED = {
     "transforms.unchecked_poses": "for kernels, which check what it reads",
     "WorldHits": "made by World's queries",
     "PairDerivatives": "made by queries",
+    "ImpactDerivatives": "a tuple, made by queries",
+    "NestedHull": "a tuple, made by queries",
     "PairResult": "made by queries",
     "Uniqueness": "an enumeration of Python's own",
     "Contacts": "made by queries",
