@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from time_budget import slower_than
 
 HERE = Path(__file__).resolve().parent
@@ -46,11 +47,13 @@ def run(folder: Path, *options: str) -> str:
     return done.stdout + done.stderr
 
 
+@pytest.mark.slow
 def test_a_test_over_the_budget_fails_and_names_itself(tmp_path):
     said = run(tmp_path, "--budget", "0.25")
     assert "1 failed, 3 passed" in said and "test_times.py::test_long took 0.5 s of processor time" in said
 
 
+@pytest.mark.slow
 def test_seconds_are_kept_and_told_where_they_grew(tmp_path):
     file = tmp_path / "seconds.json"
     file.write_text(json.dumps({"test_times.py::test_quick": 0.9, "test_gone.py::test_gone": 3.0}), encoding="utf-8")

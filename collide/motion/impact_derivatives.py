@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from collide.derivatives.uniqueness import Uniqueness
-from collide.motion.impact_query import poses_in_motion, time_of_impact
+from collide.motion.impact_query import checked_omega, poses_in_motion, time_of_impact
 from collide.motion.impact_rows import TimeOfImpact
 from collide.pairs.query import distance
 from collide.transforms import as_poses
@@ -82,7 +82,7 @@ def impact_derivatives(
     """
     poses: list[Any] = [as_poses(X, name) for X, name in (
         (X_WA0, "X_WA0"), (X_WA1, "X_WA1"), (X_WB0, "X_WB0"), (X_WB1, "X_WB1"))]
-    omegas = [None if omega is None else np.atleast_2d(np.asarray(omega, float)) for omega in (omega_WA, omega_WB)]
+    omegas = [checked_omega(omega, name)[0] for omega, name in ((omega_WA, "omega_WA"), (omega_WB, "omega_WB"))]
     n = max(len(X) for X in (*poses, *(omega for omega in omegas if omega is not None)))
     poses = [np.broadcast_to(X, (n, 4, 4)).copy() for X in poses]
     impact = time_of_impact(A, B, *poses, omega_WA=omegas[0], omega_WB=omegas[1], tolerance=tolerance)

@@ -108,7 +108,7 @@ def time_of_impact(
     matrices = {"X_WA0": X_WA0, "X_WA1": X_WA1, "X_WB0": X_WB0, "X_WB1": X_WB1}
     poses, singles = zip(*(_checked_poses(X, name, check_poses) for name, X in matrices.items()))
     turns = {"omega_WA": omega_WA, "omega_WB": omega_WB}
-    omegas, single_omegas = zip(*(_checked_omega(omega, name) for name, omega in turns.items()))
+    omegas, single_omegas = zip(*(checked_omega(omega, name) for name, omega in turns.items()))
     counts = {name: len(X) for name, X in zip((*matrices, *turns), (*poses, *omegas)) if X is not None}
     n, are_shapes = matched_counts(A, B, counts)
     motions = Motions(*poses, *omegas)
@@ -152,7 +152,7 @@ def poses_in_motion(
     """
     X0, single0 = _checked_poses(X_WA0, "X_WA0", True)
     X1, single1 = _checked_poses(X_WA1, "X_WA1", True)
-    omega, single_omega = _checked_omega(omega_WA, "omega_WA")
+    omega, single_omega = checked_omega(omega_WA, "omega_WA")
     array = checks.array("poses_in_motion: time", time, "() or (N,)", InvalidArgument)
     times = np.ascontiguousarray(array.reshape(-1))
     if array.ndim > 1 or not (np.isfinite(times).all() and (times >= 0.0).all() and (times <= 1.0).all()):
@@ -191,7 +191,7 @@ def moved_poses(X_WA0: PoseLike, velocity_WA: ArrayLike, omega_WA: ArrayLike) ->
         Where numbers are not finite, or lengths do not match.
     """
     X, single = _checked_poses(X_WA0, "X_WA0", True)
-    omega, single_omega = _checked_omega(omega_WA, "omega_WA")
+    omega, single_omega = checked_omega(omega_WA, "omega_WA")
     velocity, single_velocity = _vectors(velocity_WA, "velocity_WA")
     if omega is None:
         raise InvalidArgument("moved_poses: omega_WA must be (3,) or (N, 3), got None")
@@ -244,7 +244,7 @@ def _vectors(values, name: str) -> tuple[np.ndarray, bool]:
     return rows, array.ndim == 1
 
 
-def _checked_omega(omega, name: str) -> tuple[np.ndarray | None, bool]:
+def checked_omega(omega, name: str) -> tuple[np.ndarray | None, bool]:
     if omega is None:
         return None, True
     rows, single = _vectors(omega, name)

@@ -147,7 +147,7 @@ def test_closed_forms(name):
             assert np.isnan(step).all() or step == pytest.approx(row["distance"] * row["normal"], abs=off), case
 
 
-@pytest.mark.many(2)
+@pytest.mark.many(6)
 @pytest.mark.parametrize("name", ENGINES)
 def test_swapping_the_bodies_negates_the_normal(name):
     cases = [CASES[c] for c in ("boxes apart", "boxes overlapping", "sphere capsule", "hull box")]

@@ -77,6 +77,7 @@ def random_case(rng, k: int):
     return plane, fcl.CollisionObject(geometry, pose()), cells
 
 
+@pytest.mark.slow
 def test_sides_are_exact():
     """Whether they meet, and how far apart they are, as fractions have it."""
     rng = np.random.default_rng(22)

@@ -211,6 +211,7 @@ class Renamed(NamedTuple):
     x: float
 
 
+@pytest.mark.slow
 def test_a_record_of_a_class_that_was_renamed_is_as_if_it_were_not_there(tmp_path, monkeypatch):
     """The build went no further until somebody deleted the folder."""
     called = kept_lowered.Called(("module", "kernel", "0"), (), None, ())

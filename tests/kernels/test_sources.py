@@ -131,7 +131,7 @@ def changed_by(hashes, file: Path, old: str, new: str) -> set[str]:
     return {name for name in UNEDITED if UNEDITED[name] != after[name]}
 
 
-@pytest.mark.many(6)
+@pytest.mark.slow
 @pytest.mark.many(2)
 @pytest.mark.parametrize(
     ("name", "old", "new", "stale", "fresh"),

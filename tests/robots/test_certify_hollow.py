@@ -109,7 +109,7 @@ def settings() -> list[Setting]:
     return [Setting(seed) for seed in range(SEEDS)]
 
 
-@pytest.mark.many(2)
+@pytest.mark.slow
 def test_motions_that_are_certified_free_have_no_sample_that_meets(settings):
     free = collides = total = found = 0
     for seed, setting in enumerate(settings):

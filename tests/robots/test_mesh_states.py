@@ -115,6 +115,7 @@ def test_a_mesh_around_a_body_is_no_hit_of_its_hull():
     assert 10 < sum(expected) < 50 and checker.collides(Q).tolist() == checker.collides(Q).tolist() == expected
 
 
+@pytest.mark.slow
 def test_margins_count_from_swept_surfaces():
     """Boxes of places around a body among a mesh: those proven free have no place that meets the mesh; far places of
     large boxes are told apart by the margin alone.

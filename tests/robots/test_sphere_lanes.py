@@ -43,6 +43,7 @@ def share_settled(checker: collide.RobotChecker, Q: np.ndarray) -> float:
     return n / (len(Q) // 8 * 8)
 
 
+@pytest.mark.slow
 def test_verdicts_are_those_of_every_pair_asked_alone():
     n_hits, shares = [], []
     for seed in range(12):

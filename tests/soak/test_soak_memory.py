@@ -63,6 +63,7 @@ def test_a_pair_that_holds_its_shapes_is_noticed(monkeypatch):
     assert len(survivors) > 15 and kept
 
 
+@pytest.mark.slow
 def test_a_shape_that_holds_itself_is_noticed(monkeypatch):
     monkeypatch.setattr(facet_bodies, "held_by", lambda owner, shape: lambda: shape)
     survivors, *_ = drops(100, seed=5, uses=("contacts", "distance"))

@@ -62,6 +62,7 @@ def test_flush_assemblies_have_no_more_facets_than_the_peers():
     assert sum(ours) <= sum(peers) and fewer > more, (sum(ours), sum(peers), fewer, more)
 
 
+@pytest.mark.slow
 def test_the_surface_moves_as_far_as_told():
     """Points of the clean surface lie as near to the exact one as told; of the exact one, thin gaps vanish."""
     farthest = 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from mesh_shapes import bumpy_sphere
 from naive_triangles import as_integers, cross, inner, minus, triangles_meet, world_points
 
@@ -53,6 +54,7 @@ def solids_in_touch(rng):
     return A, B, X, Y
 
 
+@pytest.mark.slow
 def test_crossings_are_those_of_all_pairs_in_integers(monkeypatch):
     """What is asked leaves facets out in most results, also in rounds where facets cross."""
     asked_of = []

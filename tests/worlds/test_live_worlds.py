@@ -191,6 +191,7 @@ def move_one_by_one(world: collide.World, k: int) -> None:
         world.collides()
 
 
+@pytest.mark.many(4)
 @pytest.mark.parametrize("change", [*CHANGES, remove_and_add, filter_pairs, move_one_by_one])
 @pytest.mark.parametrize("question", ["collisions", "distances", "contacts", "raycast", "query"])
 def test_a_question_that_has_begun_ends_with_the_bodies_that_it_began_with(change, question, monkeypatch):

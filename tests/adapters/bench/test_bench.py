@@ -60,6 +60,7 @@ def test_errors_are_parts_of_the_size(points):
     assert points["right"].error.max() < 1e-15 and points["collide"].error.max() < 1e-15
 
 
+@pytest.mark.slow
 def test_wrong_booleans_are_counted_with_and_without_touching_pairs(points):
     wrong = points["wrong"]
     assert (wrong.pairs, wrong.apart, wrong.wrong, wrong.wrong_apart) == (4, 3, 2, 1)

@@ -102,6 +102,7 @@ def test_what_portals_decide_is_right_and_proven():
     assert (rows["iterations"][decided(rows)] <= MAX_ITERATIONS).all()
 
 
+@pytest.mark.slow
 def test_batches_answer_as_single_calls_and_exact_arithmetic_do():
     cases = asked(390, "batches")
     A, B = [case.A for case in cases], [case.B for case in cases]

@@ -169,6 +169,7 @@ def test_answers_keep_poses_of_their_own():
     collide.verify(box, box, EYE, before, found)
 
 
+@pytest.mark.slow
 def test_every_answer_of_the_walk_is_proven_and_the_proof_checks():
     """In rational numbers: the plane against all vertices, or the point against all facets."""
     rng = np.random.default_rng(12)
