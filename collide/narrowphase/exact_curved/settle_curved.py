@@ -21,6 +21,7 @@ from collide.lowering.shape_table import (
     POSE_SLOP,
     POSE_TERMS,
     RADIUS,
+    REACH,
     SLOP,
     PoseTable,
 )
@@ -67,7 +68,7 @@ def settle_curved(
             A, B, units = _integer_bodies(table, poses, sets, parts, n)
             decision = settle_pair(A, B, n, _point_of(row, units))
             if not decision.is_open:
-                _write(row, decision, A, B, units, limit)
+                _write(row, decision, A, B, units, limit, _size_of(table, poses, sets, parts))
 
 
 def _is_served(table, poses: PoseTable, sets: list[int], parts: list[int]) -> bool:
@@ -77,6 +78,12 @@ def _is_served(table, poses: PoseTable, sets: list[int], parts: list[int]) -> bo
     if any(table.numbers[s, SLOP] for s in sets):
         return False
     return all(poses.rows[p, POSE_SLOP] == 0.0 or poses.rows[p, POSE_TERMS] >= 0.0 for p in parts)
+
+
+def _size_of(table, poses: PoseTable, sets: list[int], parts: list[int]) -> float:
+    """S of a pair as `bounds.py` has it, of matrices that stretch nothing [m]."""
+    p_WA, p_WB = poses.rows[parts, 9:12]
+    return float(table.numbers[sets][:, [REACH, RADIUS]].sum() + np.linalg.norm(p_WB - p_WA))
 
 
 def _integer_bodies(
@@ -178,8 +185,9 @@ def _point_of(row: np.ndarray, units: Units) -> tuple[int, int, int, int]:
 
 
 def _write(
-    row: np.ndarray, decision: Decision, A: IntegerBody, B: IntegerBody, units: Units, limit: float
+    row: np.ndarray, decision: Decision, A: IntegerBody, B: IntegerBody, units: Units, limit: float, size: float
 ) -> None:
+    """What was decided, into a row.   size : S of the pair (`bounds.py`) [m]."""
     row["how"], row["exact"] = EXACT, 1
     is_hit = decision.point is not None
     row["hit"] = is_hit
@@ -199,7 +207,6 @@ def _write(
         row["distance"] = np.where(row["distance"] > 0.0, row["distance"], row["upper"])
         if row["lower"][0] > limit:
             row["beyond"], row["upper"], row["distance"] = True, math.inf, row["lower"]
-    size = float(np.abs(row["point_a"]).max() + np.abs(row["point_b"]).max())
     row["certified"] = row["beyond"] | (row["upper"] - row["lower"] <= PROMISE_CURVED * size)
     lay_points_apart(row, np.zeros(1, dtype=np.int64))
 

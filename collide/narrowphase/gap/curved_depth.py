@@ -138,7 +138,9 @@ def _bracket(pair, s, v, length, lower, work):
     error, over = ERROR * s.size, 1.0 / s.unit
     least, greatest = dd.bracket(lower, error), dd.bracket(upper, error)
     off = norm(dd.leading(dd.sub_vec3(v, dd.times_vec3(dd.div(dd.inner(s.n, v), dd.inner(s.n, s.n)), s.n))))
-    is_good = s.is_found and 0.5 < length.high < 2.0 and off <= _ASIDE * s.size
+    # Features whose points are no supports, as a base where the tip is meant, bound a depth at points elsewhere.
+    is_support = excess.high <= _ASIDE * s.size
+    is_good = s.is_found and is_support and 0.5 < length.high < 2.0 and off <= _ASIDE * s.size
     is_proven = is_good and 0.0 < least.lower < math.inf and greatest.upper < math.inf
     return CurvedDepth(
         is_proven, over * least.lower, over * greatest.upper, divide(dd.leading(s.n), length.high),
