@@ -67,7 +67,7 @@ class ShapeTable:
         key = tuple((id(shape), X_BS.tobytes()) for shape, X_BS in shapes)
         if key not in self._rows:
             self._seen.append(shapes)
-            self._rows[key] = self._new_row(self._drawn(shapes))
+            self._rows[key] = self._new_row(drawn(shapes, self._size))
         return self._rows[key]
 
     def _new_row(self, drawn: Drawn) -> int:
@@ -80,27 +80,6 @@ class ShapeTable:
             self._of_bytes[digest] = len(self._shapes)
             self._shapes.append(drawn)
         return self._of_bytes[digest]
-
-    def _drawn(self, shapes: Sequence[PosedShape]) -> Drawn:
-        vertices, faces, deviations, n = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)], [0.0], 0
-        clouds = []
-        for shape, X_BS in shapes:
-            if isinstance(shape, PointCloud):
-                clouds.append(Points(shape.points @ X_BS[:3, :3].T + X_BS[:3, 3], shape.radii))
-                continue
-            try:
-                points, corners = made = tessellate(shape, size=self._size)
-            except (InvalidArgument, UnsupportedQuery):  # no triangles of its kind, or too many
-                continue
-            vertices.append(points @ X_BS[:3, :3].T + X_BS[:3, 3])
-            faces.append(np.asarray(corners, dtype=np.int64) + n)
-            deviations.append(made.deviation)
-            n += len(points)
-        return Drawn(
-            np.concatenate(vertices), np.concatenate(faces), max(deviations),
-            any(is_smooth(shape) for shape, _ in shapes),
-            any(isinstance(shape, Halfspace) or shape.is_region for shape, _ in shapes), drawn_points.together(clouds),
-        )
 
     def boxes(self) -> list[np.ndarray | None]:
         """(2, 3) lowest and highest corner of each shape in its frame [m]; None of unbounded and of empty ones."""
@@ -115,6 +94,29 @@ class ShapeTable:
         cap = facet_cap([len(drawn.faces) for drawn in self._shapes], self._max_facets)
         sizes = sorted(len(drawn.points.centres) for drawn in self._shapes if drawn.points is not None)
         return [_written(drawn, cap, max(_level(sizes, MAX_POINTS), 1)) for drawn in self._shapes]
+
+
+def drawn(shapes: Sequence[PosedShape], size: float) -> Drawn:
+    """What posed shapes look like together; empty of what has neither triangles nor points.   size : see `ShapeTable`.
+    """
+    vertices, faces, deviations, n = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)], [0.0], 0
+    clouds = []
+    for shape, X_BS in shapes:
+        if isinstance(shape, PointCloud):
+            clouds.append(Points(shape.points @ X_BS[:3, :3].T + X_BS[:3, 3], shape.radii))
+            continue
+        try:
+            points, corners = made = tessellate(shape, size=size)
+        except (InvalidArgument, UnsupportedQuery):  # no triangles of its kind, or too many
+            continue
+        vertices.append(points @ X_BS[:3, :3].T + X_BS[:3, 3])
+        faces.append(np.asarray(corners, dtype=np.int64) + n)
+        deviations.append(made.deviation)
+        n += len(points)
+    return Drawn(
+        np.concatenate(vertices), np.concatenate(faces), max(deviations), any(is_smooth(shape) for shape, _ in shapes),
+        any(isinstance(shape, Halfspace) or shape.is_region for shape, _ in shapes), drawn_points.together(clouds),
+    )
 
 
 def is_smooth(shape: Shape) -> bool:

@@ -7,7 +7,7 @@ first, the last, or the nearest approach; of too many changes, the page says how
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -67,24 +67,39 @@ def of_trajectory(stated: Stated, max_samples: int = MAX_SAMPLES) -> dict:
     watch, path = stated.watch, stated.watch.path
     row_of = {body.name: row for row, body in enumerate(stated.scene.bodies)}
     samples, left_out = samples_of_page(watch, max_samples)
-    poses = watch.poses_at(samples)
-    standing = _standing_verdicts(stated)
-    open_pairs = {entry[side]: NOT_ANSWERED for entry in watch.unanswered for side in ("a", "b")}
-    rows, verdicts = [], []
-    for k, at_sample in zip(samples.tolist(), poses):
-        look = watch.look_at(k, at_sample)
-        rows.append(_state_row(_of_look(look), look.least, bool(watch.unanswered)))
-        of_bodies = dict(standing)
-        for name, verdict in (*_bodies_of(look, watch.names), *open_pairs.items()):
-            of_bodies[name] = worst((of_bodies.get(name, ORDER[-1]), verdict))
-        verdicts.append(verdict_columns(of_bodies, row_of))
+    poses, rows, verdicts = [], [], []
+    for moment in moments(stated, samples):
+        poses.append(moment.poses)
+        rows.append(_state_row(_of_look(moment.look), moment.look.least, bool(watch.unanswered)))
+        verdicts.append(verdict_columns(moment.verdicts, row_of))
     times = None if path.times is None else path.times[samples].tolist()
     return {
         "labels": [f"{100 * share:.3g} %" for share in path.share[samples]], "shares": path.share[samples].tolist(),
         "times": times, "samples": _about(len(samples), len(path.share), left_out), "start": 0,
-        "moving": [row_of[name] for name in watch.moving], "poses": _poses_as_text(poses), "rows": rows,
+        "moving": [row_of[name] for name in watch.moving], "poses": _poses_as_text(np.array(poses)), "rows": rows,
         "body_verdicts": verdicts,
     }
+
+
+class Moment(NamedTuple):
+    """A sample of a trajectory: poses (m, 4, 4) of the moving bodies, the near pairs, and body → verdict."""
+
+    poses: np.ndarray
+    look: Look
+    verdicts: dict[str, str]
+
+
+def moments(stated: Stated, samples: np.ndarray) -> Iterator[Moment]:
+    """Each of some samples of a trajectory.   stated : as of `of_trajectory`."""
+    watch = stated.watch
+    standing = _standing_verdicts(stated)
+    open_pairs = {entry[side]: NOT_ANSWERED for entry in watch.unanswered for side in ("a", "b")}
+    for k, poses in zip(samples.tolist(), watch.poses_at(samples)):
+        look = watch.look_at(k, poses)
+        verdicts = dict(standing)
+        for name, verdict in (*_bodies_of(look, watch.names), *open_pairs.items()):
+            verdicts[name] = worst((verdicts.get(name, ORDER[-1]), verdict))
+        yield Moment(poses, look, verdicts)
 
 
 # --- which samples ------------------------------------------------------------------------------

@@ -183,6 +183,7 @@ GIVEN = {
     "python": "",
     "clouds": "",
     "voxels": "",
+    "viewers": "open('cell.yaml', 'w').write('{collide: 1, robots: [{urdf: panda.urdf}]}')",
     "distance_fields": "",
     "barba-langerman": "A = B = collide.ConvexHull(np.random.default_rng(0).normal(size=(60, 3)))\n"
     "X_WA, X_WB = np.eye(4), collide.pose((1, 0, 0))",
@@ -234,6 +235,7 @@ GIVEN = {
 NEEDED = {
     "arrays": ("torch",),
     "robots": ("yaml", "mujoco"), "disabled-pairs": ("yaml",), "engines": ("mujoco",), "pages": ("yaml",),
+    "viewers": ("yaml", "viser", "rerun", "foxglove"),
     "report-schema": ("yaml", "trimesh"), "scene-format": ("yaml",), "planning": ("yaml", "ompl"),
 }
 #: Pages whose Python is not run here, and where it is, or why it is not.

@@ -81,7 +81,7 @@ def _is_served(table, poses: PoseTable, sets: list[int], parts: list[int]) -> bo
 
 
 def _size_of(table, poses: PoseTable, sets: list[int], parts: list[int]) -> float:
-    """S of a pair as `bounds.py` has it, of matrices that stretch nothing [m]."""
+    """The size S of a pair (`bounds.py`) under matrices without stretch [m]."""
     p_WA, p_WB = poses.rows[parts, 9:12]
     return float(table.numbers[sets][:, [REACH, RADIUS]].sum() + np.linalg.norm(p_WB - p_WA))
 
