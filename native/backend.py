@@ -16,6 +16,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import editable_types
 import platforms
 from setuptools import build_meta
 from setuptools.build_meta import *
@@ -38,6 +39,12 @@ def get_requires_for_build_editable(config_settings=None) -> list[str]:
 
 def get_requires_for_build_sdist(config_settings=None) -> list[str]:
     return build_meta.get_requires_for_build_sdist(config_settings) + _compilers()
+
+
+def build_editable(wheel_directory, config_settings=None, metadata_directory=None) -> str:
+    name = build_meta.build_editable(wheel_directory, config_settings, metadata_directory)
+    editable_types.add_types(Path(wheel_directory) / name, ROOT)
+    return name
 
 
 def build_sdist(sdist_directory, config_settings=None) -> str:

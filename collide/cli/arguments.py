@@ -95,6 +95,7 @@ _REPORT = """examples:
   collide report robot.urdf --repair              solids of broken meshes
   collide report scene.yaml --json - | jq '.colliding[] | [.a, .b, .depth]'
   collide report panda_workbench --html page.html       to look at, in a browser
+  collide report cell.yaml --clearance 2cm --csv pairs.csv
 
 A scene is a file (URDF, MJCF, SDFormat, planning scene, mesh, scene YAML) or
 the name of a shipped one; several files make one scene.
@@ -239,6 +240,8 @@ def _add_report(commands) -> None:
                         help="how each answer is known, which pairs were never tested, and what took how long")
     parser.add_argument("--geometry", action="store_true",
                         help="add poses, shapes and triangles of every body to the JSON, to draw it from")
+    parser.add_argument("--csv", metavar="FILE",
+                        help="write every pair that collides, touches or is near as a line of a table")
     _output_arguments(parser)
     cli_pages.add_argument(parser)
     cli_pages.add_glb_argument(parser)

@@ -149,6 +149,8 @@ def _report(args) -> int:
 
     if args.geometry and not args.json:
         raise InvalidArgument("--geometry adds to the JSON of a report: give --json FILE too")
+    if args.csv:
+        check_place("--csv", args.csv, ".csv")
     progress = _progress(args.quiet)
     made = cli_scenes.reports(args, progress, _STARTED, clearance=args.clearance)
     if args.geometry:
@@ -157,6 +159,10 @@ def _report(args) -> int:
         for state_report in made:
             state_report.report.geometry = geometry.of_scene(state_report.scene)
     _write_reports(made, args.json)
+    if args.csv:
+        from collide.reports.state_reports import csv_text
+
+        write_whole(args.csv, csv_text(made))
     if args.html:
         cli_pages.write_report(args, made, progress)
     if args.glb:

@@ -39,9 +39,8 @@ def reports(args, progress: Callable, started: float | None, **limits) -> list:
             if args.certify:
                 from collide.reports.trajectory_proof import RESOLUTION, prove
 
-                with progress("proving the trajectory"):
-                    resolution = min(args.resolution, RESOLUTION)
-                    proof = prove(tested, watch.path, limits.get("clearance", 0.0), resolution)
+                resolution = min(args.resolution, RESOLUTION)
+                proof = prove(tested, watch.path, limits.get("clearance", 0.0), resolution, progress)
                 state_report.trajectory |= {"proof": proof, "certified": proof["free"]}
         made.append(states.Stated(label, scene, state_report, watch))
     return made
@@ -82,15 +81,14 @@ def _pair(scene, words: str) -> tuple[str, str]:
 
 def load_states(args, progress: Callable) -> list:
     """The scene in each state asked for: (label, Scene); one without a label where no state was named."""
-    with progress("reading the scene"):
-        from collide.scenes import load
+    from collide.scenes import load
 
-        options = ("robot", "srdf", "meshes", "missing_meshes", "package_path", "scale")
-        load_options = {name: getattr(args, name) for name in options if getattr(args, name) is not None}
-        words = args.state or []
-        if not words or (len(words) == 1 and not re.search(r"[,=]|^[-+\d.]", words[0])):  # a name, or a file
-            return [("", load(*args.scenes, state=words[0] if words else None, **load_options))]
-        from collide.scenes.loaders.state_words import in_states
+    options = ("robot", "srdf", "meshes", "missing_meshes", "package_path", "scale")
+    load_options = {name: getattr(args, name) for name in options if getattr(args, name) is not None}
+    words = args.state or []
+    if not words or (len(words) == 1 and not re.search(r"[,=]|^[-+\d.]", words[0])):  # a name, or a file
+        return [("", load(*args.scenes, state=words[0] if words else None, progress=progress, **load_options))]
+    from collide.scenes.loaders.state_words import in_states
 
-        states = in_states(load(*args.scenes, state=None, **load_options), words)
-        return states if len(states) > 1 else [("", states[0][1])]
+    states = in_states(load(*args.scenes, state=None, progress=progress, **load_options), words)
+    return states if len(states) > 1 else [("", states[0][1])]

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from collide.reports import terminal
+from collide.reports import classes, terminal
 from collide.reports.number_format import count, lengths
 from collide.reports.report import Report
 from collide.reports.report_tables import depth_texts
@@ -37,6 +39,24 @@ def items(made: list[Stated]) -> Iterator[tuple[str, object]]:
     yield "schema", SCHEMA
     yield "verdict", {"text": _verdict(made), "collides": any(state.report.collides for state in made)}
     yield "states", [{"name": state.label, "report": state.report.to_dict()} for state in made]
+
+
+def csv_text(made: list[Stated]) -> str:
+    """Every listed pair as a line for spreadsheets, deepest or nearest first of each class; lengths in metres.
+
+    Empty fields are unbounded: a depth without end, or a bracket without an upper end. Vectors take three columns.
+    """
+    out = io.StringIO()
+    rows = csv.writer(out, lineterminator="\n")
+    vectors = {name: [f"{name}_{axis}" for axis in "xyz"] for name in ("normal", "point_a", "point_b")}
+    plain = ("a", "b", "distance", "lower", "upper", "how", "certified")
+    rows.writerow(("state", "class", *plain, *(column for columns in vectors.values() for column in columns)))
+    for state in made:
+        for name in classes.NAMES:
+            for pair in getattr(state.report, name).dicts():
+                numbers = [number for vector in vectors for number in pair[vector]]
+                rows.writerow((state.label, name, *(pair[field] for field in plain), *numbers))
+    return out.getvalue()
 
 
 def render(made: list[Stated], *, everything: bool, proofs: bool, width: int, whole_names: bool) -> list[Line]:

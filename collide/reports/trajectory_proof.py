@@ -13,25 +13,30 @@ import numpy as np
 import collide
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.reports.number_format import brief_length, count
+from collide.reports.progress import silent
 
 if TYPE_CHECKING:
     from collide.reports.trajectory_report import Path
 
 #: Intervals in which no joint moves by more [rad or m] are not halved any more.
 RESOLUTION = 1e-3
+_PROVING = "proving the trajectory"
 
 
-def prove(scene, path: Path, clearance: float = 0.0, resolution: float = RESOLUTION) -> dict:
+def prove(scene, path: Path, clearance: float = 0.0, resolution: float = RESOLUTION, progress=None) -> dict:
     """The plain data ``proof`` of a trajectory in ``schema.json``: shares of the path proven, open, and the first hit.
 
     scene : at the first waypoint.   path : sampled, with all waypoints.   clearance, resolution : [m], [rad or m].
+    progress : as in `report.make`.
     """
-    proof = _prove(scene, path, clearance, resolution)
+    with (progress or silent)(_PROVING) as set_label:
+        set_share = (lambda done, n: set_label(f"{_PROVING}: {done / n:.0%}")) if set_label else None
+        proof = _prove(scene, path, clearance, resolution, set_share)
     return {**proof, "text": _in_words(proof)}
 
 
-def _prove(scene, path: Path, clearance: float, resolution: float) -> dict:
-    """The proof without words."""
+def _prove(scene, path: Path, clearance: float, resolution: float, set_share) -> dict:
+    """The proof without words.   set_share : called with the motions done and their number, or None."""
     corners = np.unique(path.waypoint, return_index=True)[1]
     waypoints = {name: q[corners] for name, q in path.configurations.items()}
     moving = [name for name, q in waypoints.items() if (q != q[0]).any()]
@@ -43,7 +48,7 @@ def _prove(scene, path: Path, clearance: float, resolution: float) -> dict:
         q, shares = np.concatenate([q, q]), np.array([0.0, 1.0])
     try:
         checker = collide.RobotChecker.from_scene(scene, robot, padding=clearance)
-        made = checker.certify_path(q, resolution=resolution)
+        made = checker.certify_path(q, resolution=resolution, progress=set_share)
     except (InvalidArgument, UnsupportedQuery) as error:
         return _nothing(clearance, str(error))
     at = np.interp

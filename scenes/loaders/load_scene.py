@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -58,6 +59,7 @@ def load(
     package_path: str | Path | Iterable = (),
     scale: float | str | None = None,
     missing_meshes: str = "error",
+    progress=None,
 ) -> Scene:
     """A scene from one file, several files together, or the name of a shipped scene.
 
@@ -86,6 +88,8 @@ def load(
         Factor on the vertices of mesh files that are named directly, or their unit: 0.001 or "mm".
     missing_meshes : {"error", "skip"}
         "skip": links whose mesh is absent are not checked, which is noted.
+    progress : callable, optional
+        As of `collide.boolean`: the label says which of several files is read.
 
     Returns
     -------
@@ -102,7 +106,15 @@ def load(
     options = Options(robot, srdf, meshes, tuple(_paths(package_path)), factor, missing_meshes)
     mesh_loader.check_meshes_option(meshes)
     files = [named(path_or_name, options.package_path) for path_or_name in (path, *more_paths)]
-    parts = read_each(files, lambda path_or_name: _load_one(_resolve(path_or_name), options))
+    with nullcontext() if progress is None else progress("reading the scene") as set_label:
+
+        def read(entry: tuple[int, Any]) -> Scene:
+            k, path_or_name = entry
+            if set_label and len(files) > 1:
+                set_label(f"reading the scene: {k / len(files):.0%}, {cut(str(path_or_name), LONGEST_PLACE)}")
+            return _load_one(_resolve(path_or_name), options)
+
+        parts = read_each(enumerate(files), read)
     scene = parts[0] if len(parts) == 1 else _together(parts)
     if state is not None:
         scene = _in_state(scene, state)

@@ -6,6 +6,7 @@ their own (imports, pipes, signals) start one each.
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 import re
@@ -97,6 +98,18 @@ def test_check_prints_one_line_a_pair(scene, capsys):
     out, err = capsys.readouterr()
     assert out == "collision\ta\tb\t-0.01\ntouching\ta\tc\t0.0\n"
     assert err == "collide: 1 collision, 1 touching, all 3 pairs answered\n"
+
+
+def test_report_writes_every_pair_as_a_line(scene, tmp_path):
+    scene(HIT, TOUCH, NEAR)
+    table = tmp_path / "pairs.csv"
+    assert cli.main(["report", "x.yaml", "--clearance", "50mm", "--csv", str(table), "--quiet"]) == 0
+    rows = list(csv.DictReader(table.read_text().splitlines()))
+    assert [(row["class"], row["a"], row["b"], float(row["distance"])) for row in rows] == [
+        ("colliding", "a", "b", -0.01), ("touching", "a", "c", 0.0), ("near", "b", "c", 0.02),
+    ]
+    assert len(rows[0]) == 18 and {row["state"] for row in rows} == {""}
+    assert cli.main(["report", "x.yaml", "--csv", str(tmp_path / "pairs.txt")]) == 2
 
 
 def test_quiet_says_nothing(scene, capsys):

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import io
 import time
+from contextlib import contextmanager
 
 import pytest
 
+from collide import scenes
 from collide.reports.progress import Progress, silent
 
 
@@ -93,3 +95,27 @@ def test_streams_that_are_closed_or_know_few_letters():
     closed.close()
     progress._write("text")
     assert not progress.terminal
+
+
+def labels_of(work) -> list[str]:
+    """Labels that ``work(progress)`` gives."""
+    labels: list[str] = []
+
+    @contextmanager
+    def progress(label: str):
+        labels.append(label)
+        yield labels.append
+
+    work(progress)
+    return labels
+
+
+def test_reading_several_files_says_how_far_it_is(tmp_path):
+    files = [tmp_path / f"{name}.off" for name in "abcd"]
+    for file in files:
+        file.write_text("OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n")
+    labels = labels_of(lambda progress: scenes.load(*files, progress=progress))
+    assert labels[0] == "reading the scene"
+    shares = [label.split(", ")[0] for label in labels[1:]]
+    assert shares == [f"reading the scene: {k}%" for k in (0, 25, 50, 75)]
+    assert labels[-1].endswith("d.off")
