@@ -26,7 +26,7 @@ from collide.errors import InvalidShape
 from collide.shapes.shape_files import ANY, pack, unpack
 
 #: Raised with every change in what a loader stores; old entries are then never read again.
-VERSION = 4
+VERSION = 5
 #: The array that holds the key.
 _KEY = "key"
 

@@ -34,8 +34,13 @@ def check(content: bytes, path: Path) -> list[str]:
             if primitive.tag in _PRIMITIVES:
                 _check_primitive(primitive, by_id, path)
     _check_nodes(root, by_id, path)
-    moved = next(root.iter("instance_controller"), None)
-    return [] if moved is None else ["meshes that bones move (<instance_controller>) were not read"]
+    notes = []
+    if next(root.iter("instance_controller"), None) is not None:
+        notes.append("meshes that bones move (<instance_controller>) were not read")
+    axis = (root.findtext("asset/up_axis") or "Z_UP").strip()
+    if axis != "Z_UP":
+        notes.append(f"<up_axis> {cut(axis)} turned nothing: coordinates are as in the file, as RViz has them")
+    return notes
 
 
 def _at(path: Path, element: ET.Element, what: str, inside: str = "") -> NoReturn:

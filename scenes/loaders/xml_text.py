@@ -8,15 +8,18 @@ from pathlib import Path
 
 from collide.base.given_files import read_bytes
 from collide.errors import SceneError, listing
+from collide.scenes.loaders.xacro_file import expanded
 
 
 def parse_xml(path: Path, notes: list[str]) -> ET.Element:
     """The root of an XML file, its own default namespace taken off.
 
     Prefixes nobody declared are common in files made by hand from xacro; they are tolerated, since
-    no element of URDF, SRDF or MJCF has a prefix, and noted. What is not XML at all is refused.
+    no element of URDF, SRDF or MJCF has a prefix, and noted. What is not XML at all is refused. Of a .xacro file the
+    XML that it stands for is parsed.
     """
-    blob = read_bytes(path).lstrip()  # blanks before <?xml ...?> are common, and harmless
+    content = expanded(path) if path.suffix.lower() == ".xacro" else read_bytes(path)
+    blob = content.lstrip()  # blanks before <?xml ...?> are common, and harmless
     try:
         root = ET.fromstring(blob)
     except ET.ParseError as error:

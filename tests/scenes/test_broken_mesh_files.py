@@ -300,6 +300,11 @@ def test_what_is_wrong_is_refused_with_place_and_value(tmp_path, case):
             DAE.replace("</node>", '<instance_controller url="#c"/></node>'),
             "meshes that bones move (<instance_controller>) were not read",
         ),
+        (
+            "a.dae",
+            DAE.replace("Z_UP", "Y_UP"),
+            "a.dae: <up_axis> Y_UP turned nothing: coordinates are as in the file, as RViz has them",
+        ),
         ("a.gltf", gltf(lambda h: h["meshes"][0]["primitives"].append({"attributes": {"POSITION": 0}, "mode": 1})), "is lines (mode 1) and was not read"),
     ],
 )
