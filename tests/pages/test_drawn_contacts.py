@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 
 import numpy as np
@@ -36,7 +37,13 @@ def test_patches_stand_where_boxes_meet():
         assert [p[2] for p in patch["points"]] == pytest.approx([z] * 4, abs=1e-9)
         assert patch["depths"] == pytest.approx([depth] * 4, abs=1e-9) and np.abs(patch["normal"]).tolist() == [0, 0, 1]
         volume = pytest.approx(depth * 1.0, abs=1e-12)
-        assert entry["overlap"] == {"volume": volume, "certified": True} and "state" not in entry
+        overlap = entry["overlap"]
+        assert overlap["volume"] == volume and overlap["certified"] and "state" not in entry
+        assert ("triangles" in overlap) == (depth > 0.0)
+    common = deep["overlap"]
+    corners = np.frombuffer(base64.b64decode(common["triangles"]), "<f4").reshape(-1, 3) + common["origin"]
+    assert np.allclose(corners.min(axis=0), (-0.2, -0.5, 0.499), atol=1e-6)
+    assert np.allclose(corners.max(axis=0), (0.8, 0.5, 0.5), atol=1e-6) and len(corners) == 36
     assert about["pairs"] == about["of"] == 2 and "volumes" in about["note"]
 
 

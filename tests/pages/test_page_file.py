@@ -6,6 +6,7 @@ import base64
 import hashlib
 import os
 import random
+import re
 
 import pytest
 from parsed_page import Page, small_viewer
@@ -76,7 +77,9 @@ def test_the_viewer_that_ships():
     assert page.elements == plain.elements and page.elements["script"] == 4
     assert page.data("report")["names"] == HOSTILE and not page.comments
     for tag, attributes in page.attributes:
-        assert not any(name.startswith("on") or "//" in (value or "") for name, value in attributes.items()), tag
+        # hashes of the policy are base64, which has slashes
+        bad = re.compile(r"^\s*//|://")
+        assert not any(name.startswith("on") or bad.search(value or "") for name, value in attributes.items()), tag
 
 
 def test_data_are_ascii_without_markup(viewer):

@@ -345,16 +345,19 @@ def test_hostile_names_stay_text(page):
 SAMPLES = "5 of 2001"
 
 
-def states_page(page: PageBrowser, proof: dict | None = None):
-    """Two boxes, the second coming nearer in five states; the pair's row is of the worst of them."""
+def states_page(page: PageBrowser, proof: dict | None = None, known=None):
+    """Two boxes, the second coming nearer in five states; the pair's row is of the worst of them.
+
+    known : what the page knows of the gaps, None where nothing.
+    """
     gaps = [0.5, 0.25, 0.0, -0.5, 0.125]
     classes = ["free", "near", "touching", "colliding", "near"]
     poses = np.zeros((5, 1, 3, 4))
     poses[:, 0, :, :3] = np.eye(3)
     poses[:, 0, 0, 3] = [2 + gap for gap in gaps]
     rows = []
-    for gap, verdict in zip(gaps, classes):
-        entry = {"verdict": verdict, "clearance": gap, "left_out": 0, **{name: [] for name in CLASSES}}
+    for gap, verdict, clearance in zip(gaps, classes, known or gaps):
+        entry = {"verdict": verdict, "clearance": clearance, "left_out": 0, **{name: [] for name in CLASSES}}
         if verdict != "free":
             entry[verdict] = [[0, 1, gap, gap, gap]]
         rows.append(entry)
@@ -398,6 +401,143 @@ def test_states_move_the_bodies_and_tell_their_verdicts(page):
     assert page.run(place) == [2.125, 0, 0] and page.texts("#states .play") == ["▶ play"]
     page.open(page._folder / "states.html", "#pair=still|mover&state=3")
     assert page.run(place) == [1.5, 0, 0] and "depth 500.000 mm" in selected(page)
+
+
+@pytest.mark.parametrize(
+    ("known", "caption"),
+    [
+        ([0.5, 0.25, 0.0, -0.5, 0.125],
+         "signed distance of the nearest pair from -500.000 mm to 500.000 mm; below the line bodies overlap"),
+        ([0.5, 0.25, 0.02, 0.03, 0.125], "least clearance from 20.000 mm to 500.000 mm"),
+        ([0.5, None, 0.0, None, 0.125], "least clearance from 0.000 mm to 500.000 mm, without a number in 2 states"),
+        ([0.004] * 5, "least clearance 4.000 mm in every state"),
+        ([None, None, 0.004, None, None], "least clearance 4.000 mm in every state, without a number in 4 states"),
+        ([0.0] * 5, "least clearance 0.000 mm in every state"),
+        ([None] * 5, "samples shown"),
+    ],
+)
+def test_the_curve_is_told_in_words_whatever_is_known(page, known, caption):
+    page.open(states_page(page, known=known))
+    (remark,) = page.texts("#states .remark")
+    assert remark.startswith(f"{caption}; samples shown" if caption[0] != "s" or known[0] else caption), remark
+    assert "undefined" not in page.run("return document.querySelector('main').textContent") and "NaN" not in remark
+
+
+def test_two_states_stand_side_by_side(page):
+    page.open(states_page(page), "#state=3")
+    page.press("h")
+    assert page.measures()["second"] == 3 and page.texts("#second .caption") == ["sample 3 ✕colliding"]
+    page.press("[")
+    measures = page.measures()
+    assert (measures["state"], measures["second"]) == (2, 3), "the second picture keeps its state"
+    widths = page.run("return [...document.querySelectorAll('.pictures canvas')].map((c) => c.clientWidth)")
+    assert len(widths) == 2 and abs(widths[0] - widths[1]) <= 2
+    page.press("h")
+    assert page.measures()["second"] is None and page.logs() == []
+
+
+@pytest.mark.parametrize(("width", "height"), [(1000, 500), (1600, 420), (500, 1000)])
+@pytest.mark.parametrize("link", ["#pair=first|second", "#pair=second|third"])
+def test_the_camera_frames_both_bodies_of_a_pair(page, width, height, link):
+    page.open(small(page, "framed"), link, width=width, height=height)
+    page.wait("return !collideViewer.measures().flying")
+    page.measures()
+    frame = page.run("const f = document.querySelector('.canvas-frame'); return [f.clientWidth, f.clientHeight]")
+    for name in link[6:].split("|"):
+        corners = np.array(page.run("return collideViewer.cornersOf(arguments[0])", name))
+        assert len(corners) == 8 and (corners >= 0).all() and (corners <= frame).all(), (name, corners, frame)
+
+
+def test_labels_lie_on_no_badge_and_on_no_other_label(page, workcell):
+    place, data = workcell
+    for row in data["colliding"][:2] + data["near"][:2]:
+        page.open(place, f"#pair={quote(row['a'])}|{quote(row['b'])}")
+        page.wait("return !collideViewer.measures().flying")
+        page.measures()
+        boxes = page.run(
+            "return [...document.querySelectorAll('#labels .tag:not([hidden])')].map((n) => n.getBoundingClientRect())"
+            ".map((r) => [r.left, r.top, r.right, r.bottom])")
+        badges = page.run("return [...document.querySelectorAll('#labels .tag:not([hidden])')].map((n) => "
+                          "n.classList.contains('badge'))")
+        assert len(boxes) >= 4 and sum(badges) == 2
+        for (a, of_a), (b, of_b) in itertools.combinations(zip(boxes, badges), 2):
+            meet = a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
+            assert not meet or (of_a and of_b), (row["a"], row["b"], a, b)
+
+
+def test_frames_of_robots_are_drawn_on_request(page):
+    bodies = [body("still", (0, 0, 0), "free"), *(body(f"link {k}", (k, 0, 0), "free", owner="arm") for k in range(1, 4))]
+    page.open(page.write("frames", report=report_of("frames"), drawing=drawing_of([box(0.4)], bodies)))
+    assert page.measures()["frames"] == 0
+    page.press("r")
+    assert page.measures()["frames"] == 3, "of what robots carry"
+    page.run("collideViewer.select('still')")
+    assert page.measures()["frames"] == 1, "of what is selected"
+    page.press("r")
+    assert page.measures()["frames"] == 0
+
+
+def test_a_picture_is_saved_as_png(page):
+    page.open(small(page, "saved"))
+    name, start, size = page.run("""
+        let made = null;
+        document.createElement = ((create) => (tag) => {
+          const node = create.call(document, tag);
+          if (tag === 'a') node.click = () => { made = node; };
+          return node;
+        })(document.createElement);
+        document.dispatchEvent(new KeyboardEvent('keydown', {key: 's'}));
+        return [made.download, made.href.slice(0, 22), made.href.length];""")
+    assert (name, start) == ("saved.png", "data:image/png;base64,") and size > 5000
+
+
+def test_what_two_solids_share_is_told_and_drawn(page):
+    corners = np.array([[-0.25, -1, -1], [0.25, -1, -1], [0, 1, 1]] * 4, dtype=float)
+    overlap = {"volume": 8.410928510265143e-05, "certified": True, "origin": [0.75, 0, 0], "triangles": packed(corners, "<f4")}
+    patch = {"points": [[1, -1, -1], [1, 1, -1], [1, 1, 1]], "normal": [1, 0, 0], "depths": [0.5, 0.5, 0.5]}
+    entry = {"a": "first", "b": "second", "patches": [patch], "overlap": overlap}
+    bare = {**entry, "overlap": None, "patches": []}
+    calls = []
+    for contacts in (bare, entry):
+        page.open(small(page, "shared", contacts=[contacts]), "#pair=first|second")
+        page.wait("return !collideViewer.measures().flying")
+        calls.append(page.measures()["calls"])
+    assert calls[1] >= calls[0] + 5, "the volume, the patch and an arrow at each of its points"
+    assert "84.11 cm³, certified" in page.texts("#tables .detail dd")
+
+
+def test_a_bound_keeps_its_sign_and_counts_say_of_what(page):
+    bound = {**pair("first", "second", -0.5, (1, 0, 0)), "upper": 0.0, "lower": -0.5, "certified": False}
+    bodies = [body("first", (0, 0, 0), "colliding"), body("second", (1.5, 0, 0), "colliding")]
+    page.open(page.write("bound", report=report_of("bound", colliding=[bound]), drawing=drawing_of([box(1.0)], bodies)),
+              "#pair=first|second")
+    assert "depth ≤ 500.000 mm" in selected(page)
+    counts = page.texts(".chip .count")
+    assert counts[0] == "2 bodies" and set(counts[1:]) == {"no body"}
+    assert page.texts("#table-colliding .count") == ["1 pair"] and page.texts("#table-bodies .count") == ["2 bodies"]
+    page.enter("#filter-name", "nobody")
+    assert page.texts("#table-colliding .count") == ["0 of 1 pair"]
+    assert page.texts("#table-colliding .pager") == ["the filters hide it"]
+
+
+def test_a_column_has_one_unit(page):
+    rows = [pair(f"a{k}", f"b{k}", gap) for k, gap in enumerate((2e-6, 3.5e-4, 0.02))]
+    page.open(page.write("units", report=report_of("units", near=rows), drawing=drawing_of([box(1.0)], [])))
+    cells = page.run("return [...document.querySelectorAll('#table-near tbody tr')].map((r) => r.cells[2].textContent)")
+    assert cells == ["0.00200 mm", "0.350 mm", "20.000 mm"]
+
+
+@pytest.mark.parametrize("n", [0, 1, 50, 2000])
+@pytest.mark.parametrize(("width", "height"), [(1400, 900), (1000, 500), (390, 800)])
+def test_reports_of_any_length_fit_the_window(page, n, width, height):
+    names = [f"part {k}" for k in range(n + 1)]
+    rows = [pair(a, b, -0.01 * (k + 1)) for k, (a, b) in enumerate(itertools.pairwise(names))]
+    bodies = [body(name, (2.1 * k, 0, 0), "colliding" if n else "free") for k, name in enumerate(names)]
+    place = page.write("length", report=report_of("length", colliding=rows), drawing=drawing_of([box(1.0)], bodies))
+    page.open(place, width=width, height=height)
+    assert page.run("return document.documentElement.scrollWidth <= innerWidth") and page.logs() == []
+    assert page.texts("#table-colliding .count") == ([f"{n:,} pair{'s' * (n != 1)}"] if n else [])
+    assert "undefined" not in page.run("return document.querySelector('main').textContent")
 
 
 def test_a_proof_is_a_band_under_the_verdicts(page):

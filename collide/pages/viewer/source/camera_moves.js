@@ -85,9 +85,13 @@ export class CameraMoves {
     return 1.08 * half || 1;
   }
 
-  /** A pair, its normal seen from the side: depth and gap are seen at their full length. */
-  flyToPair(center, normal, halfHeight) {
-    this.fly(center, normal ? fromTheSide(this._stage.direction, normal) : this._stage.direction, halfHeight);
+  /** A pair at a point, its normal seen from the side: depth and gap are seen at their full length, and all of the boxes. */
+  flyToPair(point, normal, boxes) {
+    const direction = fromTheSide(this._stage.direction, normal);
+    // what is looked at lies between the point and the middle of the boxes: both stay in the picture
+    const around = boxes.reduce((all, box) => all.union(box), new Box3());
+    const target = around.isEmpty() ? point : point.clone().lerp(around.getCenter(new Vector3()), 0.5);
+    this.fly(target, direction, this.halfHeightOf([...boxes, new Box3(point.clone(), point.clone())], target, direction));
   }
 }
 
@@ -100,7 +104,7 @@ function fromTheSide(direction, normal) {
   return side.z < 0.3 ? side.add(new Vector3(0, 0, 0.3 - side.z)).normalize() : side;
 }
 
-function cornersOf({ min, max }) {
+export function cornersOf({ min, max }) {
   return Array.from({ length: 8 }, (_, k) => new Vector3(k & 1 ? max.x : min.x, k & 2 ? max.y : min.y, k & 4 ? max.z : min.z));
 }
 

@@ -6,7 +6,8 @@ const KEYS = [
   ["1 2 3 4", "front, side, top, corner"], ["o", "parallel lines or perspective"],
   ["g", "ghost what is not selected"], ["x", "see through the selected bodies"],
   ["w", "wire overlay of the geometry really tested"], ["c", "section plane"],
-  ["[ ]", "state before / after"], ["p", "play or pause the states"],
+  ["r", "frames of robots' links, or of the selected bodies"], ["s", "save the scene as a picture"],
+  ["[ ]", "state before / after"], ["p", "play or pause the states"], ["h", "hold this state in a picture beside"],
   ["/", "filter by the name of a body"], ["Esc", "select nothing"], ["?", "this list"],
 ];
 const MOUSE = [

@@ -9,14 +9,50 @@ export function briefLength(metres) {
   return `${significant(metres, 3)} m`;
 }
 
-/** A length in a column: three decimals and its unit; null is unbounded. */
+/** A length that stands alone: as in a column of its own; null is unbounded. */
 export function columnLength(metres) {
-  if (metres === null || metres === undefined || !Number.isFinite(metres)) return "unbounded";
-  const size = Math.abs(metres);
-  if (size === 0 || (size >= 1e-4 && size < 10)) return `${(metres * 1e3).toFixed(3)} mm`;
-  if (size >= 10 && size < 1e6) return `${metres.toFixed(3)} m`;
-  if (size >= 1e-7 && size < 1e-4) return `${(metres * 1e6).toFixed(3)} µm`;
-  return `${metres.toExponential(2)} m`;
+  return isLength(metres) ? inUnit(metres, unitOf(Math.abs(metres))) : "unbounded";
+}
+
+/** Lengths of a column, all in the unit of the largest: a function of a length. */
+export function columnOf(lengths) {
+  let largest = 0;
+  for (const metres of lengths) if (isLength(metres)) largest = Math.max(largest, Math.abs(metres));
+  const unit = unitOf(largest);
+  return (metres) => (isLength(metres) ? inUnit(metres, unit) : "unbounded");
+}
+
+function isLength(metres) {
+  return metres !== null && metres !== undefined && Number.isFinite(metres);
+}
+
+/** `[name, units in a metre]`; null where numbers are powers of ten of a metre. */
+function unitOf(largest) {
+  if (largest >= 1e6 || (largest > 0 && largest < 1e-7)) return ["m", null];
+  if (largest >= 10) return ["m", 1];
+  return largest >= 1e-4 || largest === 0 ? ["mm", 1e3] : ["µm", 1e6];
+}
+
+/** Three decimals, more where these would be less than three significant digits. */
+function inUnit(metres, [unit, factor]) {
+  if (factor === null) return `${metres ? exponential(metres, 2) : "0.000"} ${unit}`;
+  const value = metres * factor;
+  const size = Math.abs(value);
+  if (size === 0 || size >= 0.0995) return `${value.toFixed(3)} ${unit}`;
+  return `${size < 1e-4 ? exponential(value, 2) : value.toFixed(2 - Math.floor(Math.log10(size)))} ${unit}`;
+}
+
+/** `1.5 m³`, `12.3 cm³`, `0.4 mm³`. */
+export function volumeText(cubicMetres) {
+  for (const [unit, size] of [["m³", 1], ["cm³", 1e-6]]) {
+    if (cubicMetres >= 0.1 * size) return `${significant(cubicMetres / size, 4)} ${unit}`;
+  }
+  return `${significant(cubicMetres / 1e-9, 4)} mm³`;
+}
+
+/** As Python writes it: two digits of the power of ten, at least. */
+function exponential(value, digits) {
+  return value.toExponential(digits).replace(/e([+-])(\d)$/, "e$10$2");
 }
 
 /** How narrow a proven bracket is [m]: one digit says it. */

@@ -4,6 +4,7 @@ import { listenToKeys } from "./key_commands.js";
 import { columnLength } from "./lengths.js";
 import { followLive, isLive, keepCamera, takeKeptCamera } from "./live_page.js";
 import { readBlock } from "./page_data.js";
+import { isBound } from "./pair_tables.js";
 import { trajectoryVerdict } from "./path_tables.js";
 import { PageTheme } from "./page_theme.js";
 import { preparePrint } from "./print_view.js";
@@ -11,6 +12,7 @@ import { ReportModel } from "./report_model.js";
 import { RowFilters } from "./row_filters.js";
 import { SceneTools } from "./scene_tools.js";
 import { SceneView } from "./scene_view.js";
+import { SecondState } from "./second_state.js";
 import { Selection, readLink } from "./selection.js";
 import { StatesStrip } from "./states_strip.js";
 import { TablesPanel } from "./tables_panel.js";
@@ -36,7 +38,9 @@ function startScene(page) {
   const { model, selection, panel, filters, strip } = page;
   const view = makeScene(model, selection);
   const tools = view ? new SceneTools(sceneNodes(), view, model, selection) : null;
-  const theme = new PageTheme(byId("theme"), () => view?.setTheme());
+  const second = view ? new SecondState(byId("second"), model, selection, view) : null;
+  strip.setSecond(second);
+  const theme = new PageTheme(byId("theme"), () => { view?.setTheme(); second?.setTheme(); });
   selection.follow((now, changed) => {
     if (changed.has("state")) filters.setState(now.state);
     announce(now, model);
@@ -51,7 +55,7 @@ function startScene(page) {
   addEventListener("hashchange", () => openLink(model, selection));
   openLink(model, selection);
   startLive(page, view);
-  announceMeasures(view, model, selection);
+  announceMeasures(view, model, selection, second);
 }
 
 /** Once, after the browser has painted what stands; in a window that is not seen soon all the same. */
@@ -129,8 +133,9 @@ function showVerdict(model) {
 function announce(now, model) {
   const caption = byId("caption");
   if (now.pair) {
-    const { a, b, verdict, distance, depth } = model.witnessed(now.pair, now.state);
-    const size = distance === undefined ? "" : depth ? `depth ${columnLength(depth)}` : `distance ${columnLength(distance)}`;
+    const full = model.witnessed(now.pair, now.state);
+    const { a, b, verdict, distance, depth } = full;
+    const size = distance === undefined ? "" : depth ? `depth ${isBound(full) ? "≤ " : ""}${columnLength(depth)}` : `distance ${columnLength(distance)}`;
     const text = `${verdict ? `${verdict}, ` : ""}${size}`;
     refill(caption, verdict ? swatch(verdict) : null, ` ${shorten(printable(a), 40)} and ${shorten(printable(b), 40)}`, text ? `: ${text}` : "");
   } else if (now.body !== null) {
@@ -175,14 +180,16 @@ function connectKeys({ selection, panel, tools, strip, filters }) {
   const help = listenToKeys(byId("keys"), {
     j: () => panel.walk(1), k: () => panel.walk(-1), f: run("fit"), o: run("orthographic"), 1: run("front"), 2: run("side"),
     3: run("top"), 4: run("iso"), g: run("ghosts"), x: run("seeThrough"), w: run("wire"), c: run("section"),
+    r: run("frames"), s: run("picture"),
     "[": () => strip.step(-1), "]": () => strip.step(1), p: () => { if (!byId("states").hidden) strip.toggle(); },
+    h: () => strip.hold(),
     "/": () => filters.focusName(), Escape: () => selection.clear(),
   });
   byId("help").addEventListener("click", help);
 }
 
 /** Counts and camera for whoever measures the page, and a way to select by name. */
-function announceMeasures(view, model, selection) {
+function announceMeasures(view, model, selection, second) {
   let pictures = 0;
   const opened = performance.now(); // since the page was asked for [ms]
   view?.stage.afterRender(() => { pictures += 1; });
@@ -193,6 +200,8 @@ function announceMeasures(view, model, selection) {
     camera: view?.stage.camera.position.toArray() ?? null,
     target: view?.stage.controls.target.toArray() ?? null,
     flying: view?.moves.isFlying ?? false,
+    frames: view?.frames.count ?? 0,
+    second: second?.state ?? null,
     state: selection.state,
     bodies: model.bodies.length,
     pictures,
@@ -202,6 +211,7 @@ function announceMeasures(view, model, selection) {
     measures,
     renderNow: () => view?.stage.render(),
     placeOf: (name) => view?.placeOf(name) ?? null,
+    cornersOf: (name) => view?.cornersOf(name) ?? null,
     select: (name) => (name === null ? selection.clear() : selection.selectBody(name)),
   });
   document.documentElement.dataset.ready = "true";

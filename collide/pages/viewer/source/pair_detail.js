@@ -1,5 +1,5 @@
 /** What unfolds below a row: every number of a pair with its proven bracket, and how it is known. */
-import { bracketWidth, columnLength, counted, directionText, exactLength, pointText } from "./lengths.js";
+import { bracketWidth, columnLength, counted, directionText, exactLength, pointText, volumeText } from "./lengths.js";
 import { isBound } from "./pair_tables.js";
 import { placeText } from "./path_tables.js";
 import { element, printable, wholeName } from "./text_nodes.js";
@@ -116,7 +116,7 @@ function contactFacts(contacts) {
   }
   if (contacts.overlap) {
     const { volume, certified } = contacts.overlap;
-    facts.push(["overlap", `${volume} m³${certified ? ", certified" : ", an estimate"}`]);
+    facts.push(["overlap", `${volumeText(volume)}${certified ? ", certified" : ", an estimate"}`]);
   }
   for (const [key, value] of Object.entries(contacts)) {
     if (!["a", "b", "class", "state", "patches", "overlap"].includes(key) && value !== null) facts.push([key.replaceAll("_", " "), plain(value)]);

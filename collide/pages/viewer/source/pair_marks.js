@@ -7,6 +7,7 @@ import { BufferAttribute, BufferGeometry, Color, ConeGeometry, DoubleSide, Group
 import { LineMaterial } from "three/addons/lines/LineMaterial.js";
 import { LineSegments2 } from "three/addons/lines/LineSegments2.js";
 import { LineSegmentsGeometry } from "three/addons/lines/LineSegmentsGeometry.js";
+import { decodeArray } from "./page_data.js";
 
 const Y = new Vector3(0, 1, 0);
 
@@ -63,6 +64,33 @@ export class PairMarks {
       head.scale.setScalar(tall);
       head.position.copy(end).addScaledVector(along, -0.5 * tall);
     }
+  }
+
+  /**
+   * Contacts of a pair: patches with an arrow at each point, as long as the depth there, and what both bodies share.
+   * place : takes a point of the world into the scene.   colors : of patches, of the volume.   half : see `addPatch`.
+   */
+  addContacts({ patches, overlap }, place, [color, ofVolume], half) {
+    for (const { points, normal, depths } of patches ?? []) {
+      const placed = points.map(place);
+      this.addPatch(placed, color, 0.02 * half);
+      placed.forEach((point, k) => {
+        const length = Math.max(Math.abs(depths[k]), 0.12 * half);
+        this.addArrow(point, point.clone().addScaledVector(new Vector3(...normal), length), color, 1.2);
+      });
+    }
+    if (overlap?.triangles) this._addVolume(decodeArray(overlap.triangles, Float32Array), place(overlap.origin), ofVolume);
+  }
+
+  /** Triangles (corners one after the other, nine numbers each) about a point of the scene, filled. */
+  _addVolume(corners, origin, color) {
+    const geometry = new BufferGeometry().setAttribute("position", new BufferAttribute(corners, 3));
+    const fill = new Mesh(geometry, new MeshBasicMaterial({
+      color: new Color(color), side: DoubleSide, transparent: true, opacity: 0.35, depthTest: false,
+    }));
+    fill.position.copy(origin);
+    fill.renderOrder = 9;
+    this.group.add(fill);
   }
 
   /** A contact patch: its polygon filled where it has three corners or more, its points marked. points : in the scene. */

@@ -5,7 +5,7 @@
  * A column: `{title, kind, cell(row), value(row)}`, kind as in the terminal (name, number, label, text); `narrow: false`
  * leaves it out of small windows, where the unfolded row has it.
  */
-import { bracketWidth, briefLength, columnLength, counted, secondsText } from "./lengths.js";
+import { bracketWidth, briefLength, columnOf, counted, secondsText } from "./lengths.js";
 import { element, nameNode } from "./text_nodes.js";
 import { verdictNode } from "./verdicts.js";
 
@@ -33,7 +33,7 @@ export function reportTables(report) {
 
 /** One class of pairs; `measure` says what its number is: depth, distance or within. */
 export function pairTable(id, title, hint, rows, measure) {
-  const columns = [nameColumn("body A", "a"), nameColumn("body B", "b"), measureColumn(measure)];
+  const columns = [nameColumn("body A", "a"), nameColumn("body B", "b"), measureColumn(measure, rows)];
   if (measure === "within") {
     columns.push({ title: "exactly", kind: "label", cell: exactVerdict, value: exactVerdict });
   } else {
@@ -55,10 +55,12 @@ export function nameColumn(title, key) {
   };
 }
 
-export function measureColumn(measure) {
+/** Depths, distances or widths of rows, in one unit. */
+export function measureColumn(measure, rows) {
+  const text = columnOf(rows.map((row) => measured(row, measure)));
   return {
     title: measure, kind: "number", value: (row) => measured(row, measure),
-    cell: (row) => `${boundSign(row, measure)}${columnLength(measured(row, measure))}`,
+    cell: (row) => `${boundSign(row, measure)}${text(measured(row, measure))}`,
   };
 }
 

@@ -1,5 +1,5 @@
 /** Tables of several states and of a trajectory (`collide/reports/state_reports.py`). */
-import { briefLength, columnLength, counted } from "./lengths.js";
+import { briefLength, columnLength, columnOf, counted } from "./lengths.js";
 import { factTable, isBound, measureColumn, nameColumn, pairTable } from "./pair_tables.js";
 import { verdictNode } from "./verdicts.js";
 
@@ -52,15 +52,16 @@ function motionTable(verdict, title, hint, trajectory, measure) {
     });
   }
   const columns = [
-    nameColumn("body A", "a"), nameColumn("body B", "b"), depthOrDistance(measure), ...places,
+    nameColumn("body A", "a"), nameColumn("body B", "b"), depthOrDistance(measure, trajectory[verdict] ?? []), ...places,
     { title: "samples", kind: "number", narrow: false, cell: (row) => String(row.samples), value: (row) => row.samples },
   ];
   return { id: `path-${verdict}`, title, hint, columns, rows: trajectory[verdict] ?? [], of: "pair", verdict };
 }
 
-function depthOrDistance(measure) {
+function depthOrDistance(measure, rows) {
   const size = (row) => (row.distance === null ? Infinity : Math.abs(row.distance));
-  return { ...measureColumn(measure), value: size, cell: (row) => `${isBound(row) ? "≤ " : ""}${columnLength(size(row))}` };
+  const text = columnOf(rows.map(size));
+  return { ...measureColumn(measure, []), value: size, cell: (row) => `${isBound(row) ? "≤ " : ""}${text(size(row))}` };
 }
 
 function pathFacts(trajectory) {
@@ -101,12 +102,13 @@ export function stateTable(report) {
     title: name, kind: "number", cell: (row) => String(row.report[name].length), value: (row) => row.report[name].length,
   });
   const deepest = (row) => (row.report.colliding.length ? row.report.colliding[0].depth ?? Infinity : 0);
+  const text = columnOf(report.states.map(deepest));
   return {
     id: "states", title: "STATES", hint: report.verdict.text, of: "state", rows: report.states.map((entry, state) => ({ ...entry, state })),
     columns: [
       { title: "state", kind: "label", cell: (row) => row.name, value: (row) => row.name },
       count("colliding"), count("touching"), count("near"),
-      { title: "deepest", kind: "number", value: deepest, cell: (row) => (deepest(row) ? columnLength(deepest(row)) : "-") },
+      { title: "deepest", kind: "number", value: deepest, cell: (row) => (deepest(row) ? text(deepest(row)) : "-") },
     ],
   };
 }

@@ -60,7 +60,7 @@ export class RowFilters {
       class: "chip", "aria-pressed": String(!this._hidden.has(verdict)),
       title: PAIR_CLASSES.includes(verdict) ? `rows of pairs and bodies: ${verdict}` : `bodies: ${verdict}`,
       onclick: () => this._set(() => this._toggle(verdict)),
-    }, swatch(verdict), verdict, element("span", { class: "count" }, counts.get(verdict) ?? "0")));
+    }, swatch(verdict), verdict, element("span", { class: "count" }, counts.get(verdict) ?? "no body")));
     const focused = [...this._chips.children].indexOf(document.activeElement);
     refill(this._chips, ...chips);
     if (focused >= 0) this._chips.children[focused].focus();

@@ -2,7 +2,7 @@
 import { Vector3 } from "three";
 import { element, refill, svgElement } from "./text_nodes.js";
 
-const AXES = [["x", new Vector3(1, 0, 0), "#d55e00"], ["y", new Vector3(0, 1, 0), "#009e73"], ["z", new Vector3(0, 0, 1), "#0072b2"]];
+export const AXES = [["x", new Vector3(1, 0, 0), "#d55e00"], ["y", new Vector3(0, 1, 0), "#009e73"], ["z", new Vector3(0, 0, 1), "#0072b2"]];
 
 export class SceneLabels {
   constructor(node, stage) {
@@ -18,28 +18,42 @@ export class SceneLabels {
     refill(this._node, ...this._labels.map((label) => label.node));
   }
 
+  /** Badges stand where they point; words stand beside, in the picture, off badges and off other words. */
   _place() {
+    const placed = this._labels.map(({ point, node }) => ({ at: this._stage.project(point), node, isBadge: node.classList.contains("badge") }));
+    for (const { at, node } of placed) node.hidden = at === null;
+    const seen = placed.filter(({ at }) => at !== null);
     const taken = [];
-    for (const { point, node } of this._labels) {
-      const at = this._stage.project(point);
-      node.hidden = at === null;
-      if (at === null) continue;
-      const y = freeHeight(at, taken, node);
-      // words stay in the picture; badges stand where they point
-      const last = this._node.clientWidth - node.offsetWidth - 10;
-      const x = node.classList.contains("badge") ? at.x : Math.max(0, Math.min(at.x, last));
-      node.style.transform = `translate(${Math.round(x)}px, ${Math.round(y)}px)`;
+    for (const { at, node, isBadge } of [...seen.filter((each) => each.isBadge), ...seen.filter((each) => !each.isBadge)]) {
+      node.style.transform = `translate(${Math.round(at.x)}px, ${Math.round(at.y)}px)`;
+      const frame = this._node.getBoundingClientRect();
+      const own = node.getBoundingClientRect();
+      const [dx, dy] = isBadge ? [0, 0] : freeShift(own, frame, taken);
+      if (dx || dy) node.style.transform = `translate(${Math.round(at.x + dx)}px, ${Math.round(at.y + dy)}px)`;
+      taken.push({ left: own.left + dx, right: own.right + dx, top: own.top + dy, bottom: own.bottom + dy });
     }
   }
 }
 
-/** Labels with words move down past each other; badges stay where they point. */
-function freeHeight(at, taken, node) {
-  if (node.classList.contains("badge")) return at.y;
-  let y = at.y;
-  while (taken.some((other) => Math.abs(other.y - y) < 22 && Math.abs(other.x - at.x) < 150)) y += 22;
-  taken.push({ x: at.x, y });
-  return y;
+/** Steps of a label that looks for a free place. */
+const STEP = 12;
+const MAX_STEPS = 12;
+
+/** The least shift [px] that takes a box into the frame and off the boxes that are taken: down, up, right, left. */
+function freeShift(own, frame, taken) {
+  const inX = Math.max(frame.left - own.left, Math.min(0, frame.right - 4 - own.right));
+  const inY = Math.max(frame.top - own.top, Math.min(0, frame.bottom - 4 - own.bottom));
+  const isFree = (dx, dy) => !taken.some((other) =>
+    own.left + dx < other.right && own.right + dx > other.left && own.top + dy < other.bottom && own.bottom + dy > other.top);
+  const isInside = (dx, dy) => own.left + dx >= frame.left - 1 && own.right + dx <= frame.right + 1
+    && own.top + dy >= frame.top - 1 && own.bottom + dy <= frame.bottom + 1;
+  for (let k = 0; k <= MAX_STEPS; k += 1) {
+    for (const [x, y] of [[0, k], [0, -k], [k, 0], [-k, 0], [k, k], [-k, -k]]) {
+      const [dx, dy] = [inX + STEP * x, inY + STEP * y];
+      if (isFree(dx, dy) && isInside(dx, dy)) return [dx, dy];
+    }
+  }
+  return [inX, inY];
 }
 
 /** Which way the world's axes point, in a corner of the picture; those that point away are paler. */

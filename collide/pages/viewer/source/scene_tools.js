@@ -8,6 +8,13 @@ import { verdictNode } from "./verdicts.js";
 
 const AXES = { x: 0, y: 1, z: 2 };
 
+/** Has the browser save the scene as it is seen. */
+function savePicture(canvas, stage, model) {
+  stage.render(); // the card may forget a picture as soon as a function ends
+  const name = `${(model.reportAt(0).scene?.name ?? "scene").replace(/[^\w.-]+/g, "_").slice(0, 60)}.png`;
+  element("a", { download: name, href: canvas.toDataURL("image/png") }).click();
+}
+
 export class SceneTools {
   /** nodes : {tools, section, hover, canvas}. */
   constructor(nodes, view, model, selection) {
@@ -41,7 +48,9 @@ export class SceneTools {
       group("bodies", option("g", "ghosts", "ghost what is not selected", "ghosts", () => this.run("ghosts")),
         option("x", "see-through", "see through the selected bodies", "seeThrough", () => this.run("seeThrough")),
         option("w", "tested", "wire overlay of the geometry really tested", "wire", () => this.run("wire")),
-        option("c", "section", "cut bodies open", "section", () => this.run("section"))),
+        option("c", "section", "cut bodies open", "section", () => this.run("section")),
+        option("r", "frames", "axes of robots' links, or of the selected bodies", "frames", () => this.run("frames"))),
+      group("picture", plain("s", "save picture", "the scene as a PNG file", () => this.run("picture"))),
     ];
     this._buttons.ghosts.setAttribute("aria-pressed", "true");
     return made;
@@ -51,6 +60,7 @@ export class SceneTools {
   run(name) {
     const view = this._view;
     if (name === "fit") view.fit();
+    else if (name === "picture") savePicture(this._nodes.canvas, view.stage, this._model);
     else if (name in VIEWS) view.fit(VIEWS[name]);
     else if (name === "orthographic") this._press(name, (on) => view.stage.setOrthographic(on));
     else if (name === "section") this._press(name, (on) => this._setSection(on));

@@ -1,7 +1,8 @@
 /** The scene: bodies at their poses, coloured by verdict, and what the selection and the tools make of them. */
 import { AxesHelper, Box3, Color, GridHelper, Vector3 } from "three";
 import { BodyBatch, boxAt, poseMatrix, wireColor, wireMaterial } from "./body_batches.js";
-import { CameraMoves, VIEWS, clearestCorner } from "./camera_moves.js";
+import { BodyFrames } from "./body_frames.js";
+import { CameraMoves, VIEWS, clearestCorner, cornersOf } from "./camera_moves.js";
 import { CloudPoints } from "./cloud_points.js";
 import { EdgeLines } from "./edge_lines.js";
 import { columnLength } from "./lengths.js";
@@ -21,13 +22,15 @@ const WITHOUT_END = 0.3;
 const EDGE = new Color("#101216");
 /** Triangles and points up to which edges of the picture are smoothed. */
 const MAX_SMOOTHED = 400000;
+/** A body so many times as large as the other of a pair is not shown whole. */
+const MUCH_LARGER = 6;
 
 export class SceneView {
   /** nodes : {canvas, labels, axes}.   Throws where the browser has no WebGL. */
   constructor(nodes, model, selection) {
     this._model = model;
     this._selection = selection;
-    this.options = { ghosts: true, wire: false, seeThrough: false };
+    this.options = { ghosts: true, wire: false, seeThrough: false, frames: false };
     this._geometries = model.drawing.shapes.map((shape) => new ShapeGeometry(shape));
     this._placeOrigin();
     const drawn = (geometry) => (geometry ? geometry.triangles.length / 3 + (geometry.points?.count ?? 0) : 0);
@@ -35,6 +38,7 @@ export class SceneView {
     this.stage = new Stage(nodes.canvas, this._size, sum <= MAX_SMOOTHED);
     this.moves = new CameraMoves(this.stage);
     this.marks = new PairMarks(this.stage);
+    this.frames = new BodyFrames(this.stage, 0.04 * this._size);
     this._labels = new SceneLabels(nodes.labels, this.stage);
     drawAxes(nodes.axes, this.stage);
     this._solid = solidMaterial();
@@ -114,6 +118,11 @@ export class SceneView {
     return row === null ? null : new Vector3().setFromMatrixPosition(this._matrices[row]).add(new Vector3(...this._origin)).toArray();
   }
 
+  /** Corners of a body's box on the screen [px], of what is before the camera. */
+  cornersOf(name) {
+    return cornersOf(this._boxOf([name])).map((corner) => this.stage.project(corner)).filter(Boolean).map(({ x, y }) => [x, y]);
+  }
+
   get bounds() {
     return this._bounds;
   }
@@ -163,11 +172,20 @@ export class SceneView {
       if (batch) this._matrices.forEach((matrix, row) => batch.setPose(row, matrix));
     }
     this._edges.setPoses(this._matrices);
+    this._placeFrames();
     this._repaint();
+  }
+
+  /** Axes of what robots carry, or of the selected bodies, where they are asked for. */
+  _placeFrames() {
+    const chosen = this._emphasised();
+    const rows = this._model.bodies.map((_, row) => row).filter((row) => (chosen.length ? chosen.includes(row) : this._model.bodies[row].owner));
+    this.frames.set(this.options.frames ? rows.map((row) => this._matrices[row]) : []);
   }
 
   _follow(now, changed) {
     if (changed.has("state")) this.setState(now.state);
+    this._placeFrames();
     this._repaint();
     this._mark(now.pair);
     if (changed.has("pair") && now.pair) this._flyToPair(now.pair);
@@ -177,6 +195,7 @@ export class SceneView {
   setOption(name, value) {
     this.options[name] = value;
     if (name === "wire" && value && !this._wire) this._addWire();
+    if (name === "frames") this._placeFrames();
     this._repaint();
     this._mark(this._selection.pair);
   }
@@ -293,9 +312,8 @@ export class SceneView {
 
   _patches(pair, css) {
     const contacts = this._model.contactsOf(pair, this._selection.state);
-    for (const patch of contacts?.patches ?? []) {
-      this.marks.addPatch(patch.points.map((p) => this.point(p)), css.getPropertyValue("--patch").trim(), 0.02 * this._halfHeightOf(pair));
-    }
+    const colors = ["--patch", "--move"].map((name) => css.getPropertyValue(name).trim());
+    if (contacts) this.marks.addContacts(contacts, (p) => this.point(p), colors, this._halfHeightOf(pair));
   }
 
   _radiusOf(name) {
@@ -312,11 +330,21 @@ export class SceneView {
     return Math.min(Math.max(1.5 * radius, 2 * size), Math.max(16 * size, radius), this._size) || 0.5 * this._size;
   }
 
+  /** Boxes to show of a pair: both bodies; of very unequal ones the smaller, and as much of the other about the point. */
+  _framed(pair, middle) {
+    const [small, large] = [pair.a, pair.b].sort((a, b) => this._radiusOf(a) - this._radiusOf(b));
+    const radius = Math.min(this._radiusOf(small), 0.5 * this._size);
+    if (this._radiusOf(large) <= MUCH_LARGER * radius) return [this._boxOf([small]), this._boxOf([large])];
+    const about = new Box3(middle.clone(), middle.clone()).expandByScalar(this._halfHeightOf(pair));
+    const box = this._boxOf([small]);
+    return box.isEmpty() ? [about] : [box, about];
+  }
+
   _flyToPair(selected) {
     const pair = this._model.witnessed(selected, this._selection.state);
     if (pair.normal) {
       const middle = this.point(pair.point_a).lerp(this.point(pair.point_b), 0.5);
-      this.moves.flyToPair(middle, new Vector3(...pair.normal), this._halfHeightOf(pair));
+      this.moves.flyToPair(middle, new Vector3(...pair.normal), this._framed(pair, middle));
       return;
     }
     this.moves.fit([this._boxOf([pair.a, pair.b])]);

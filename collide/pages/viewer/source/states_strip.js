@@ -1,5 +1,5 @@
 /** States: a slider, a strip of verdicts over time, the least clearance as a curve, and a button that plays. */
-import { columnLength } from "./lengths.js";
+import { columnLength, columnOf, counted } from "./lengths.js";
 import { element, printable, refill, svgElement } from "./text_nodes.js";
 import { lookOf, verdictNode } from "./verdicts.js";
 
@@ -26,6 +26,10 @@ export class StatesStrip {
   _build() {
     const last = this._model.stateCount - 1;
     this._play = element("button", { class: "play", onclick: () => this.toggle() }, "▶ play");
+    this._hold = element("button", {
+      class: "hold", title: "this state in a picture beside (h)", "aria-keyshortcuts": "h", "aria-pressed": "false", disabled: true,
+      onclick: () => this.hold(),
+    }, "◫ hold");
     this._slider = element("input", {
       type: "range", min: 0, max: last, step: 1, value: 0, "aria-label": "state",
       oninput: () => { this.stop(); this._selection.selectState(Number(this._slider.value)); },
@@ -34,7 +38,7 @@ export class StatesStrip {
     this._cursor = svgElement("line", { class: "cursor", y1: 0, y2: STRIP + PLOT });
     this._chart = this._buildChart();
     refill(this._node, element("h2", { class: "hidden-title" }, "States"),
-      element("div", { class: "state-line" }, this._play, this._slider, this._label), this._chart, ...this._remarks());
+      element("div", { class: "state-line" }, this._play, this._slider, this._hold, this._label), this._chart, ...this._remarks());
   }
 
   /** Left edge and right edge of a state on the chart: states stand where their share of the path is. */
@@ -107,7 +111,6 @@ export class StatesStrip {
       path += `${pen}${((left + right) / 2).toFixed(2)} ${y(row.clearance).toFixed(2)}`;
       pen = "L";
     });
-    this._range = [low, high];
     return [
       svgElement("line", { class: "zero", x1: 0, x2: WIDTH, y1: y(0), y2: y(0) }),
       svgElement("path", { class: "curve", d: path, fill: "none" }),
@@ -117,9 +120,10 @@ export class StatesStrip {
   _remarks() {
     const { samples } = this._model.states ?? {};
     const remarks = [];
-    if (this._range) remarks.push(`least clearance from ${columnLength(this._range[0])} to ${columnLength(this._range[1])}; below the line bodies overlap`);
+    const curve = curveText(this._rowsOfStates().map((row) => row.clearance));
+    if (curve) remarks.push(curve);
     const proof = this._model.trajectory?.proof;
-    const between = proof ? `${printable(proof.text)} (the band under the verdicts)` : "nothing is certified between two of them";
+    const between = proof?.text ? `${printable(proof.text)} (the band under the verdicts)` : "nothing is certified between two of them";
     if (samples) remarks.push(`samples shown: ${printable(samples)}; ${between}`);
     else if (this._model.trajectory) remarks.push(`looked at in samples: ${between}`);
     return [element("p", { class: "remark" }, remarks.join("; "))];
@@ -150,6 +154,19 @@ export class StatesStrip {
     this.stop();
     const state = Math.min(this._model.stateCount - 1, Math.max(0, this._selection.state + by));
     if (state !== this._selection.state) this._selection.selectState(state);
+  }
+
+  /** second : `SecondState`, null where there is no picture. */
+  setSecond(second) {
+    this._second = second;
+    if (this._hold && second) this._hold.disabled = false;
+  }
+
+  /** The state that is looked at in a second picture, or that picture away. */
+  hold() {
+    if (!this._second || this._node.hidden) return;
+    this._second.toggle();
+    this._hold.setAttribute("aria-pressed", String(this._second.state !== null));
   }
 
   toggle() {
@@ -183,6 +200,18 @@ export class StatesStrip {
       if (this._timer) this._next();
     }, 1000 * Math.min(2, Math.max(0.016, seconds)));
   }
+}
+
+/** The curve in words: of the nearest pair of each state its signed distance [m], null where there is no number. */
+function curveText(clearances) {
+  const known = clearances.filter((value) => value !== null && value !== undefined);
+  if (!known.length) return "";
+  const [low, high] = [Math.min(...known), Math.max(...known)];
+  const name = low < 0 ? "signed distance of the nearest pair" : "least clearance";
+  const text = columnOf(known);
+  const range = low === high ? `${text(low)} in every state` : `from ${text(low)} to ${text(high)}`;
+  const gaps = known.length < clearances.length ? `, without a number in ${counted(clearances.length - known.length, "state")}` : "";
+  return `${name} ${range}${gaps}${low < 0 && known.length > 1 ? "; below the line bodies overlap" : ""}`;
 }
 
 function percent(share) {

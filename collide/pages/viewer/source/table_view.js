@@ -10,6 +10,8 @@ import { element, printable, refill, shorten } from "./text_nodes.js";
 export const ROWS_PER_PAGE = 50;
 /** Rows of a table that go to the printer. */
 const ROWS_PRINTED = 2000;
+/** What rows are of, one and several. */
+const WHAT = { pair: ["pair"], body: ["body", "bodies"], state: ["state"], row: ["row"] };
 
 export class TableView {
   /**
@@ -103,8 +105,8 @@ export class TableView {
   render() {
     const total = this.table.rows.length;
     const rows = this._rows.slice(this._start, this._start + this._size);
-    this._count.textContent = this._rows.length === total ? total.toLocaleString("en-US")
-      : `${this._rows.length.toLocaleString("en-US")} of ${total.toLocaleString("en-US")}`;
+    const all = counted(total, ...WHAT[this.table.of ?? "row"]);
+    this._count.textContent = this._rows.length === total ? all : `${this._rows.length.toLocaleString("en-US")} of ${all}`;
     refill(this._head, ...this.table.columns.map((column) => this._heading(column)));
     refill(this._body, ...rows.flatMap((row) => this._row(row)));
     this._renderPager();
@@ -154,7 +156,8 @@ export class TableView {
   _renderPager() {
     const n = this._rows.length;
     if (n <= this._size) {
-      refill(this._pager, n ? null : element("p", { class: "remark" }, "the filters hide every row"));
+      const hidden = this.table.rows.length;
+      refill(this._pager, n ? null : element("p", { class: "remark" }, hidden ? `the filters hide ${hidden > 1 ? "all of them" : "it"}` : "none"));
       return;
     }
     const end = Math.min(n, this._start + this._size);
