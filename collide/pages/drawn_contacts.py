@@ -16,10 +16,9 @@ from collide.errors import UnsupportedQuery
 from collide.pages.drawn_points import as_base64
 from collide.reports import classes
 from collide.reports.mesh_notes import meshes_of
-from collide.reports.overlap_volumes import of_bodies
+from collide.reports.overlap_volumes import common_solid, of_bodies
 from collide.reports.pair_classes import Pair
 from collide.reports.state_reports import Stated
-from collide.solids.boolean import boolean
 
 #: Pairs whose patches a page holds, of all its states.
 MAX_PAIRS = 100
@@ -95,7 +94,7 @@ def _overlap(A, B) -> dict | None:
     if overlap is None:
         return None
     known = {"volume": overlap["volume"], "certified": True}
-    common = boolean(A.shape, B.shape, A.X_WB, B.X_WB, "intersection").mesh
+    common = common_solid(A, B)
     if common is None or len(common.faces) > _MAX_TRIANGLES:
         return known
     origin = common.vertices.mean(axis=0)

@@ -466,7 +466,8 @@ def test_labels_lie_on_no_badge_and_on_no_other_label(page, workcell):
 
 
 def test_frames_of_robots_are_drawn_on_request(page):
-    bodies = [body("still", (0, 0, 0), "free"), *(body(f"link {k}", (k, 0, 0), "free", owner="arm") for k in range(1, 4))]
+    links = [body(f"link {k}", (k, 0, 0), "free", owner="arm") for k in range(1, 4)]
+    bodies = [body("still", (0, 0, 0), "free"), *links]
     page.open(page.write("frames", report=report_of("frames"), drawing=drawing_of([box(0.4)], bodies)))
     assert page.measures()["frames"] == 0
     page.press("r")
@@ -493,7 +494,8 @@ def test_a_picture_is_saved_as_png(page):
 
 def test_what_two_solids_share_is_told_and_drawn(page):
     corners = np.array([[-0.25, -1, -1], [0.25, -1, -1], [0, 1, 1]] * 4, dtype=float)
-    overlap = {"volume": 8.410928510265143e-05, "certified": True, "origin": [0.75, 0, 0], "triangles": packed(corners, "<f4")}
+    overlap = {"volume": 8.410928510265143e-05, "certified": True}
+    overlap |= {"origin": [0.75, 0, 0], "triangles": packed(corners, "<f4")}
     patch = {"points": [[1, -1, -1], [1, 1, -1], [1, 1, 1]], "normal": [1, 0, 0], "depths": [0.5, 0.5, 0.5]}
     entry = {"a": "first", "b": "second", "patches": [patch], "overlap": overlap}
     bare = {**entry, "overlap": None, "patches": []}
