@@ -7,6 +7,7 @@ from collide.lowering.facet_bodies import has_facets
 from collide.reports.mesh_notes import meshes_of
 from collide.reports.pair_classes import Pairs
 from collide.shapes.mesh import Mesh
+from collide.solids.boolean import boolean
 from collide.solids.overlap_volume import overlap_volume
 
 #: Pairs looked at, and facets of their meshes, each pair with its own: a second, and a fraction of one.
@@ -49,7 +50,5 @@ def of_bodies(A, B) -> dict | None:
 
 
 def common_solid(A, B) -> Mesh | None:
-    """What two bodies that `of_bodies` answers have in common, as a mesh in W; None where nothing is inside."""
-    from collide.solids.boolean import boolean  # for pages alone: a report begins sooner without it
-
+    """The intersection of two bodies as a mesh in W, of bodies that `of_bodies` answers; None where it is empty."""
     return boolean(A.shape, B.shape, A.X_WB, B.X_WB, "intersection").mesh
