@@ -50,5 +50,5 @@ def of_bodies(A, B) -> dict | None:
 
 
 def common_solid(A, B) -> Mesh | None:
-    """The intersection of two bodies as a mesh in W, of bodies that `of_bodies` answers; None where it is empty."""
+    """The intersection of two solids with facets as a mesh in W; None without interior points."""
     return boolean(A.shape, B.shape, A.X_WB, B.X_WB, "intersection").mesh

@@ -38,6 +38,10 @@ ORDER = ("shapes", "pairs", "worlds", "contact", "casts", "motion", "robots", "s
 #: Public modules beside `collide` and `collide.scenes`: page → (title, modules).
 MODULES = {
     "live": ("Looking at a World", ("collide.adapters.live.world_viewer",)),
+    "viewers": (
+        "Viewers of others",
+        tuple(f"collide.adapters.viewers.{name}" for name in ("viser_view", "rerun_log", "foxglove_log")),
+    ),
     "reports": ("Reports", ("collide.reports.report", "collide.reports.classes")),
     "peers": (
         "Other engines, asked the same",
