@@ -139,23 +139,25 @@ class CutPoints:
 
     def side(self, a: int, b: int, c: int, u: int, v: int) -> int:
         """Orientation of three points seen along an axis; u, v : the numbers of the other two coordinates."""
-        p, q, r = self.near(a), self.near(b), self.near(c)
+        near = self._near
+        p, q, r = near.get(a) or self.near(a), near.get(b) or self.near(b), near.get(c) or self.near(c)
         pu, pv = p[u], p[v]
         qu, qv, ru, rv = q[u] - pu, q[v] - pv, r[u] - pu, r[v] - pv
         value = qu * rv - qv * ru
         D = max(abs(qu), abs(qv), abs(ru), abs(rv))
-        M = max(abs(pu), abs(pv)) + D
-        limit = _ERROR * D * M
+        limit = _ERROR * D * (max(abs(pu), abs(pv)) + D)
         if value > limit:
             return 1
         if value < -limit:
             return -1
-        pu_, pv_, pw = (self.exact(a)[k] for k in (u, v, 3))
-        qu_, qv_, qw = (self.exact(b)[k] for k in (u, v, 3))
-        ru_, rv_, rw = (self.exact(c)[k] for k in (u, v, 3))
-        exact = (
-            (qu_ * pw - pu_ * qw) * (rv_ * pw - pv_ * rw) - (qv_ * pw - pv_ * qw) * (ru_ * pw - pu_ * rw)
-        )
+        P, Q, R = self.exact(a), self.exact(b), self.exact(c)
+        pu_, pv_, pw, qw, rw = P[u], P[v], P[3], Q[3], R[3]
+        if pw == qw == rw == 1:  # vertices: shorter numbers
+            exact = (Q[u] - pu_) * (R[v] - pv_) - (Q[v] - pv_) * (R[u] - pu_)
+        else:
+            exact = (
+                (Q[u] * pw - pu_ * qw) * (R[v] * pw - pv_ * rw) - (Q[v] * pw - pv_ * qw) * (R[u] * pw - pu_ * rw)
+            )
         return (exact > 0) - (exact < 0)
 
     def before(self, a: int, b: int, u: int, v: int) -> int:
