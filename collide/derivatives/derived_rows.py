@@ -43,6 +43,11 @@ class SetTable(NamedTuple):
     sets: Any
 
 
+def unwritten_derived(n: int) -> Derived:
+    """Room for n rows of which the kernel writes all."""
+    return Derived(np.empty((n, DERIVATIVE)), np.empty((n, DERIVATIVE_INTS), np.int64), np.empty((n, 2)))
+
+
 def empty_derived(n: int) -> Derived:
     """Of n rows of which nothing is known."""
     derived = Derived(np.full((n, DERIVATIVE), np.nan), np.zeros((n, DERIVATIVE_INTS), np.int64), np.zeros((n, 2)))

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from collide.derivatives.active_parts import active_pairs, is_least_of_parts
-from collide.derivatives.derived_rows import Derived, empty_derived, run_rows, table_of
+from collide.derivatives.derived_rows import Derived, empty_derived, run_rows, table_of, unwritten_derived
 from collide.derivatives.gradient_rows import (
     CORE_A,
     CORE_B,
@@ -49,11 +49,11 @@ def differentiate(rows: np.ndarray, question: tuple, ask: Ask) -> Derived:
     """Derivatives of the rows of a question (A, B, X_WA, X_WB), as of `PairResult`.   ask : answers pairs anew."""
     A, B, X_WA, X_WB = question
     n = len(rows)
-    derived = empty_derived(n)
     shapes, of_a, of_b = _numbered(A, B, n)
     is_convex = np.array([is_single_convex(shape) for shape in shapes], dtype=bool)
     is_pair = is_convex[of_a] & is_convex[of_b]
     some = np.flatnonzero(is_pair)
+    derived = unwritten_derived(n) if len(some) == n else empty_derived(n)
     if len(some):
         table, poses = table_of(shapes, is_convex), (X_WA, X_WB)
         if len(some) == n:
@@ -71,7 +71,9 @@ def differentiate(rows: np.ndarray, question: tuple, ask: Ask) -> Derived:
     is_open = np.flatnonzero(derived.kinds[:, STATE] == DIRECTION_OPEN)
     if len(is_open):
         _close_directions(rows, is_open, question, ask, derived)
-    derived.numbers[derived.kinds[:, STATE] != UNIQUE, GRADIENT : GRADIENT + 12] = np.nan
+    unknown = derived.kinds[:, STATE] != UNIQUE
+    if unknown.any():
+        derived.numbers[unknown, GRADIENT : GRADIENT + 12] = np.nan
     return derived
 
 

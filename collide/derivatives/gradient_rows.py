@@ -22,6 +22,7 @@ from collide.derivatives.features import (
     reach_of,
     size_of,
     support_set,
+    vertex_of,
 )
 from collide.derivatives.settle_features import (
     PLACE_A,
@@ -38,7 +39,7 @@ from collide.derivatives.zonotope_directions import ZONOTOPE_DOUBLES, has_single
 from collide.kernels import entry, kernel, view_f64, view_i64
 from collide.lowering.packed_convex import HALFSPACE, POINTS
 from collide.narrowphase.rows import BEYOND, CERTIFIED, DISTANCE, LOWER, NORMAL, POINT_A, POINT_B, ROW, UPPER, view_row
-from collide.numerics.vec3 import Vec3, add, cross, neg, norm, put_vec3, rotate_back, scale, sub, vec3_at
+from collide.numerics.vec3 import Vec3, add, cross, neg, norm, put_vec3, rotate, rotate_back, scale, sub, vec3_at
 
 # Doubles of a derivative: the gradient by the poses of A and of B, angular then linear each; unit normal, signed
 # distance of the cores, and of either core its witness point, tangents and second derivatives along the normal.
@@ -89,7 +90,9 @@ def differentiate_rows(header_at, n):
             _put_pose(doubles, POSE_B, view_f64(words[PARTS_B_AT] + 8 * words[PART_STEP_B] * k, 16))
             A = convex_body_at(words[INTS_AT], words[NUMBERS_AT], sets_a[k])
             B = convex_body_at(words[INTS_AT], words[NUMBERS_AT], sets_b[k])
-            if _is_flat(A) and _is_flat(B):
+            if _are_points_apart(A, B, row):
+                state = _points_apart(A, B, row, doubles, out, kinds)
+            elif _is_flat(A) and _is_flat(B):
                 state = _flat_pair(A, B, row, doubles, out, kinds)
             else:
                 state = _curved_pair(A, B, row, doubles, ints, out, kinds)
@@ -124,6 +127,28 @@ def _put_pose(doubles, at, X):
         for j in range(3):
             doubles[at + 3 * i + j] = X[4 * i + j]
         doubles[at + 9 + i] = X[4 * i + 3]
+
+
+@kernel(inline=True)
+def _are_points_apart(A, B, row):
+    """Whether both sets are balls, their centres apart."""
+    if not (A.kind == POINTS and B.kind == POINTS and A.count == 1 and B.count == 1):
+        return False
+    d = row.doubles[DISTANCE] + radius_of(A) + radius_of(B)
+    return d > LEVEL * max(reach_of(A), reach_of(B))
+
+
+@kernel
+def _points_apart(A, B, row, doubles, out, kinds):
+    """Of two balls: no other point of a core can be the nearest."""
+    put_vec3(out, UNIT_NORMAL, vec3_at(row.doubles, NORMAL))
+    out[CORE_DISTANCE] = row.doubles[DISTANCE] + radius_of(A) + radius_of(B)
+    for k in range(3, 12):
+        out[CORE_A + k] = out[CORE_B + k] = 0.0
+    put_vec3(out, CORE_A, add(rotate(doubles, POSE_A, vertex_of(A, 0)), vec3_at(doubles, POSE_A + 9)))
+    put_vec3(out, CORE_B, add(rotate(doubles, POSE_B, vertex_of(B, 0)), vec3_at(doubles, POSE_B + 9)))
+    kinds[CODE_A], kinds[CODE_B], kinds[IS_FIXED] = VERTEX, VERTEX, 1
+    return UNIQUE
 
 
 @kernel

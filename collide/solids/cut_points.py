@@ -150,14 +150,13 @@ class CutPoints:
             return 1
         if value < -limit:
             return -1
-        P, Q, R = self.exact(a), self.exact(b), self.exact(c)
-        pu_, pv_, pw, qw, rw = P[u], P[v], P[3], Q[3], R[3]
+        first, second, third = self.exact(a), self.exact(b), self.exact(c)
+        pu_, pv_, pw, qw, rw = first[u], first[v], first[3], second[3], third[3]
         if pw == qw == rw == 1:  # vertices: shorter numbers
-            exact = (Q[u] - pu_) * (R[v] - pv_) - (Q[v] - pv_) * (R[u] - pu_)
+            exact = (second[u] - pu_) * (third[v] - pv_) - (second[v] - pv_) * (third[u] - pu_)
         else:
-            exact = (
-                (Q[u] * pw - pu_ * qw) * (R[v] * pw - pv_ * rw) - (Q[v] * pw - pv_ * qw) * (R[u] * pw - pu_ * rw)
-            )
+            ahead = second[u] * pw - pu_ * qw, second[v] * pw - pv_ * qw
+            exact = ahead[0] * (third[v] * pw - pv_ * rw) - ahead[1] * (third[u] * pw - pu_ * rw)
         return (exact > 0) - (exact < 0)
 
     def before(self, a: int, b: int, u: int, v: int) -> int:
