@@ -63,6 +63,7 @@ if TYPE_CHECKING:
     from collide.robots.certified_motions import CertifiedMotion
     from collide.robots.motion_plan import MotionPlan, plan
     from collide.robots.robot import Robot
+    from collide.robots.robot_batch import RobotBatch
     from collide.robots.robot_checker import RobotChecker
     from collide.robots.robot_distances import RobotDistances
     from collide.robots.splines import Spline
@@ -158,6 +159,7 @@ _HOMES = {
     "collide.robots.certified_motions": ("CertifiedMotion",),
     "collide.robots.motion_plan": ("MotionPlan", "plan"),
     "collide.robots.robot": ("Robot",),
+    "collide.robots.robot_batch": ("RobotBatch",),
     "collide.robots.robot_checker": ("RobotChecker",),
     "collide.robots.robot_distances": ("RobotDistances",),
     "collide.robots.splines": ("Spline",),
@@ -200,8 +202,8 @@ __all__ = [
     "ImpactDerivatives", "InvalidArgument", "InvalidPose", "InvalidShape", "LinkPair", "Located", "Mesh",
     "MissingExtra", "MotionPlan", "NestedHull", "OcTree", "OcTreeLeaves", "OverlapVolume", "Overlay", "PairDerivatives",
     "PairResult", "PartitionSize", "PieceAudit", "PlanarObstacle", "Plane", "PointCloud", "Portals", "Proposal",
-    "RayHits", "RepairedMesh", "Robot", "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions", "Shape",
-    "ShapeCasts", "ShapeSet", "SignedDistanceGrid", "SignedDistances", "SmoothedDistances", "SoftMinimum",
+    "RayHits", "RepairedMesh", "Robot", "RobotBatch", "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions",
+    "Shape", "ShapeCasts", "ShapeSet", "SignedDistanceGrid", "SignedDistances", "SmoothedDistances", "SoftMinimum",
     "SpacePartition", "Sphere", "Spline", "SweepResults", "SweptMesh", "TetMesh", "TimeOfImpact", "Uniqueness",
     "UnknownBody", "UnsupportedQuery", "VoxelGrid", "World", "WorldBatch", "WorldBatchResult", "WorldHits",
     "WorldResult", "audit_pieces", "boolean", "certify", "collide", "combine", "configuration_obstacle", "contacts",

@@ -50,6 +50,7 @@ class CheckWorkspace:
         capacity = max(_LEAST_OPEN, n_link_parts * (n_around + n_link_parts) + 1)
         self._open = np.empty((capacity, layout.OPEN_INTS), dtype=np.int64)
         self._seen, self._rows, self._boxes = setting.made_of, around.rows, _boxes_around(around)
+        self._rows_at, self._boxes_at = address_of(self._rows), address_of(self._boxes)
         # Behind links are rows for attached objects.
         self._bodies, self._body_boxes, self._parts, self._part_boxes, self._is_bound, self._shape_of = (
             table.copy() for table in (
@@ -135,20 +136,25 @@ class CheckWorkspace:
         a body that has moved is not a rotation.
         """
         if setting.seen is not self._seen:
-            X_WBs = setting.seen.X_WBs
-            moved = move_surroundings(
-                self.address, address_of(X_WBs), address_of(self._seen.X_WBs), address_of(self._rows),
-                address_of(self._boxes),
-            )
+            moved = self.follow(setting.seen)
             if moved == SKEWED:
                 return False
-            self._seen = setting.seen
             if moved == FIELD_MOVED:
                 self._walk_fields(setting)
         before, self.setting = self.setting, _without_spares(setting)
         if setting.filters is not before.filters or setting.maps is not before.maps:
             self._carry(setting)
         return True
+
+    def follow(self, seen) -> int:
+        """Bring the surroundings to the poses ``seen.X_WBs``, unless the matrix of a moved body is not a rotation
+        (SKEWED). FIELD_MOVED where walks of fields have to follow."""
+        moved = move_surroundings(
+            self.address, address_of(seen.X_WBs), address_of(self._seen.X_WBs), self._rows_at, self._boxes_at
+        )
+        if moved != SKEWED:
+            self._seen = seen
+        return moved
 
     def stands_at(self, setting: Setting) -> bool:
         """Whether there is nothing for `stand` to do."""

@@ -7,10 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from collide.base import argument_checks as checks
+from collide.errors import InvalidArgument, brief
 from collide.kernels import address_of
 from collide.results import PAIR_DTYPE, flipped
 from collide.robots import open_pairs
-from collide.robots.check_scene import OPEN_LOWER
+from collide.robots.check_scene import N_OPEN, OPEN_LOWER
 from collide.robots.check_tables import Setting
 from collide.robots.check_workspace import CheckWorkspace
 from collide.robots.checker_scene import CheckerScene
@@ -46,6 +48,19 @@ class DistanceQuestion(NamedTuple):
     limit: float = math.inf
     per: int = OF_ROBOT
     between: int = WITH_AROUND | AMONG_ROBOT
+
+
+def distance_question(caller: str, max_distance, per, between) -> DistanceQuestion:
+    """The question of `RobotChecker.distances`, its words checked."""
+    limit = checks.limit(f"{caller}: max_distance", max_distance)
+    return DistanceQuestion(limit, _word(caller, "per", per, PER), _word(caller, "between", between, BETWEEN))
+
+
+def _word(caller: str, name: str, value, words: dict[str, int]) -> int:
+    if not isinstance(value, str) or value not in words:
+        known = ", ".join(f'"{word}"' for word in words)
+        raise InvalidArgument(f"{caller}: {name} must be one of {known}, got {brief(value)}")
+    return words[value]
 
 
 class Slots:
@@ -100,7 +115,7 @@ def measure(checker: CheckerScene, q: np.ndarray, question: DistanceQuestion, th
             pieces[piece.start] = near_piece(checker, space, q[piece], question)
 
         checker.in_pieces(n, threads, progress, put)
-        rows, gradient, witness, counts = _joined([pieces[start] for start in sorted(pieces)], q.shape[1])
+        rows, gradient, witness, counts = joined_pieces([pieces[start] for start in sorted(pieces)], q.shape[1])
         starts = np.zeros(n + 1, dtype=np.int64)
         np.cumsum(counts, out=starts[1:])
         return RobotDistances(rows, gradient, checker.bodies, checker.around, starts, witness)
@@ -116,7 +131,7 @@ def measure(checker: CheckerScene, q: np.ndarray, question: DistanceQuestion, th
     return RobotDistances(rows, gradient, checker.bodies, checker.around, width * np.arange(n + 1), witness)
 
 
-def _joined(pieces: list[tuple], dof: int) -> tuple:
+def joined_pieces(pieces: list[tuple], dof: int) -> tuple:
     """(rows, gradients, witnesses, counts) of pieces one after the other."""
     if len(pieces) == 1:
         return pieces[0]
@@ -131,14 +146,26 @@ def measure_piece(
     """``out`` (n·slots,) NEAREST_DTYPE, ``gradient`` (n·slots, dof) and ``witness`` (n·slots, WITNESS) become those of
     the nearest pairs of configurations q (n, dof), a slot a configuration or a slot a body of the robot.
     """
-    rows = _nearest_rows(checker, space, q, question)
+    rows, of = nearest_rows(checker, space, q, question), np.arange(len(q))
+    rows = put_gradients(checker, space, q, of, rows, gradient, witness, question)
+    finish_rows(rows.reshape(-1), out, question.limit)
+
+
+def put_gradients(
+    checker: CheckerScene, space: CheckWorkspace, q: np.ndarray, of: np.ndarray, rows: np.ndarray,
+    gradient: np.ndarray, witness: np.ndarray, question: DistanceQuestion,
+) -> np.ndarray:
+    """Rows (n, slots) of `nearest_rows`, each slot's body first; gradients and witnesses are written, a row a slot.
+
+    of : (n,) numbers of the rows' configurations among q.
+    """
     if question.per == OF_BODY:  # the slot's body comes first
         is_second = (rows["a"] != NONE) & (rows["a"] != np.arange(rows.shape[1]))
         rows[is_second] = flipped(rows[is_second])
-    of = np.arange(len(q)) if rows.shape[1] == 1 else np.arange(rows.size) // rows.shape[1]
-    rows = rows.reshape(-1)
-    _put_gradients(checker, space, q, of, rows, gradient, witness)
-    _finish(rows, out, question.limit)
+    if rows.shape[1] > 1:
+        of = np.repeat(of, rows.shape[1])
+    _put_gradients(checker, space, q, of, rows.reshape(-1), gradient, witness)
+    return rows
 
 
 def near_piece(checker: CheckerScene, space: CheckWorkspace, q: np.ndarray, question: DistanceQuestion) -> tuple:
@@ -160,9 +187,9 @@ def near_piece(checker: CheckerScene, space: CheckWorkspace, q: np.ndarray, ques
         rows, gradient = np.zeros(len(near), dtype=NEAREST_DTYPE), np.empty((len(near), q.shape[1]))
         witness = np.empty((len(near), WITNESS))
         _put_gradients(checker, space, q, of, near, gradient, witness)
-        _finish(near, rows, question.limit)
+        finish_rows(near, rows, question.limit)
         pieces.append((rows, gradient, witness, np.bincount(of - first, minlength=done - first)))
-    return _joined(pieces, q.shape[1])
+    return joined_pieces(pieces, q.shape[1])
 
 
 def _with_open(
@@ -220,7 +247,7 @@ def jacobians(checker: CheckerScene, q: np.ndarray, bodies: np.ndarray, points: 
     return out
 
 
-def _finish(rows: np.ndarray, out: np.ndarray, limit: float) -> None:
+def finish_rows(rows: np.ndarray, out: np.ndarray, limit: float) -> None:
     """``out`` (m,) NEAREST_DTYPE becomes rows (m,) of PAIR_DTYPE, ``beyond`` where there is no pair."""
     for field in NEAREST_DTYPE.names or ():
         out[field] = rows[field]
@@ -230,7 +257,7 @@ def _finish(rows: np.ndarray, out: np.ndarray, limit: float) -> None:
     out["lower"][far] = limit
 
 
-def _nearest_rows(
+def nearest_rows(
     checker: CheckerScene, space: CheckWorkspace, q: np.ndarray, question: DistanceQuestion
 ) -> np.ndarray:
     """(n, slots) rows of PAIR_DTYPE of the nearest pairs within the limit; ``a`` is NONE where no pair is within.
@@ -252,6 +279,18 @@ def _nearest_rows(
         within[some] = wider[some].clip(max=limit)
         asked = _search(checker, space, q, within, rows, some, asked, slots, limit)
     return rows
+
+
+def nearest_at(
+    space: CheckWorkspace, q: np.ndarray, k: int, within: np.ndarray, rows: np.ndarray, slots: Slots, limit: float
+) -> bool:
+    """Write row k of `nearest_rows` into ``rows`` (n, slots), of configuration k among q; False where pairs are left to
+    others, of which `nearest_rows` has to be asked.   within : (n,) limits to begin with.
+    """
+    done = nearest_pairs(
+        space.address, address_of(q), q.shape[1], k, k + 1, limit, address_of(within), slots.address, address_of(rows)
+    )
+    return done > k and not space.header[N_OPEN]
 
 
 def _search(

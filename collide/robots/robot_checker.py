@@ -19,7 +19,7 @@ from collide.robots.checker_file import checker_bytes
 from collide.robots.checker_scene import CheckerScene
 from collide.robots.configuration_batches import check_piece
 from collide.robots.configuration_report import ConfigurationReport
-from collide.robots.distance_batches import BETWEEN, PER, DistanceQuestion, jacobians, measure
+from collide.robots.distance_batches import distance_question, jacobians, measure
 from collide.robots.moving_obstacles import among_moving
 from collide.robots.robot import Robot
 from collide.robots.robot_bodies import padding_of
@@ -271,8 +271,7 @@ class RobotChecker(CheckerScene):
         Pairs whose boxes are farther apart than ``max_distance`` cost a comparison, others about a microsecond, of
         convex parts. O(N P) for all P pairs without a limit.
         """
-        limit = checks.limit("RobotChecker.distances: max_distance", max_distance)
-        question = DistanceQuestion(limit, _word("per", per, PER), _word("between", between, BETWEEN))
+        question = distance_question("RobotChecker.distances", max_distance, per, between)
         q, _ = self._configurations(Q)
         return measure(self._as_of_now(), q, question, threads, progress)
 
@@ -659,10 +658,3 @@ def _positive(what: str, value) -> float:
     if number is None or not 0.0 < number < math.inf:
         raise InvalidArgument(f"{what} must be a positive number [rad or m], got {brief(value)}")
     return number
-
-
-def _word(name: str, value, words: dict[str, int]) -> int:
-    if not isinstance(value, str) or value not in words:
-        known = ", ".join(f'"{word}"' for word in words)
-        raise InvalidArgument(f"RobotChecker.distances: {name} must be one of {known}, got {brief(value)}")
-    return words[value]

@@ -291,6 +291,7 @@ GOOD: dict[str, Callable[[], dict[str, Any]]] = {
     "distance": lambda: PAIR,
     "smoothed_distances": lambda: {**PAIR, "angle": 0.1, "length": 0.01, "samples": 8},
     "WorldBatch": lambda: {"world": world()},
+    "RobotBatch": lambda: {"checker": checker(), "moving": ["a"]},
     "to_library": lambda: {"values": np.eye(3), "like": "numpy"},
     "soft_minimum": lambda: {"distances": [0.1, 0.3], "gradients": [[1.0], [2.0]], "sharpness": 20.0},
     "contacts": lambda: PAIR,
@@ -430,6 +431,7 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "PairResult": lambda: collide.distance(**PAIR),
     "RayHits": lambda: collide.raycast(**GOOD["raycast"]()),
     "WorldBatch": lambda: collide.WorldBatch(world()),
+    "RobotBatch": lambda: collide.RobotBatch(checker(), ["a"]),
     "WorldBatchResult": lambda: collide.WorldBatch(world()).distances(poses_of_worlds()),
     "WorldResult": lambda: world().distances(),
     "WorldHits": lambda: world().raycast((0, 0, 5), (0, 0, -1)),
@@ -521,6 +523,8 @@ METHODS: dict[str, Callable[[], dict[str, Any]]] = {
     "World.shape_cast": lambda: {"shape": BOX, "X_WS": EYE, "direction_W": (1, 0, 0)},
     "World.sleep": lambda: {"bodies": ["a"]},
     "World.wake": lambda: {"bodies": ["a"]},
+    "RobotBatch.collides": lambda: {"Q": [0.0], "X_WBs": [[EYE], [EYE]]},
+    "RobotBatch.distances": lambda: {"Q": [0.0], "X_WBs": [[EYE], [EYE]]},
     "WorldBatch.collides": lambda: {"X_WBs": poses_of_worlds()},
     "WorldBatch.distances": lambda: {"X_WBs": poses_of_worlds()},
     "WorldBatch.minimum": lambda: {"X_WBs": poses_of_worlds()},
@@ -556,6 +560,7 @@ _OF_ANY = {
 }
 #: Public names whose arguments are not tried, and why.
 EXCUSED = {
+    **{f"adapters.{name}": "needs the viewer: tests/adapters/viewers" for name in ("to_foxglove", "to_rerun", "to_viser")},
     "Shape": "the base of shapes: it has no arguments",
     "SignedDistanceGrid": "made by its class methods",
     "Shape.scaled": "asked of every shape",
