@@ -16,8 +16,10 @@ from collide.numerics.vec3 import Vec3, add, cross, divide, dot, put_vec3, scale
 from collide.papers.hierarchies.symbolic_perturbation import exact_side
 from collide.papers.hierarchies.true_facets import SMALL
 
-#: How far new vertices are moved towards s, as a part of the way along the edge: 2⁻³⁶, 2⁻²⁸, ...
-INSETS = 5
+#: How far new vertices are moved towards s, as a part of the way along the edge: 2⁻³⁶, 2⁻²⁸, ..., then 2⁻⁵⁰, 2⁻⁴⁷, ...
+#: Where neighbours of w are as near each other as the square root of a move, a move bends the strip between inwards.
+_LARGE_INSETS = 5
+INSETS = _LARGE_INSETS + 5
 #: Where the plane stands, as a part of the way to the nearest neighbour, seen along the axis.
 _DEPTH = 0.5
 #: How much deeper than the top of the dome its lowest vertices are.
@@ -46,12 +48,14 @@ class Cut(NamedTuple):
 
 @kernel
 def inset_of(attempt):
-    return math.ldexp(_DEPTH, -36 + 8 * attempt)
+    if attempt < _LARGE_INSETS:
+        return math.ldexp(_DEPTH, -36 + 8 * attempt)
+    return math.ldexp(_DEPTH, -50 + 3 * (attempt - _LARGE_INSETS))
 
 
 @kernel
 def prove_new(cloud, cut, j, least):
-    """Write new vertex j at the smallest provable distance from its edge; ``False`` where all proofs fail."""
+    """Write new vertex j at the first provable distance from its edge; ``False`` where all proofs fail."""
     for attempt in range(INSETS):
         if put_new(cloud, cut, j, inset_of(attempt) * least):
             return True

@@ -78,6 +78,34 @@ def crowded(n: int) -> np.ndarray:
     return np.column_stack([fine, fine * fine, fine**3])
 
 
+def random_ring(n: int, rng: np.random.Generator) -> np.ndarray:
+    """(n, 3) points of the unit circle at random angles: the nearest two are some 6/n² apart."""
+    angle = np.sort(rng.uniform(0.0, 2.0 * np.pi, n))
+    return np.column_stack([np.cos(angle), np.sin(angle), np.zeros(n)])
+
+
+def irregular(name: str, n: int, rng: np.random.Generator) -> np.ndarray:
+    """A body of about n vertices at random places: bipyramid, cone, prism, cap or doubling; "…, turned" as well."""
+    if name.endswith(", turned"):
+        return turned(irregular(name.removesuffix(", turned"), n, rng))
+    if name == "doubling":
+        return degree_doubling(int(np.log2(n / 3))) * rng.uniform(0.5, 2.0, 3)
+    if name == "cap":
+        z, angle = 1.0 - 0.1 * rng.random(n), rng.uniform(0.0, 2.0 * np.pi, n)
+        return np.column_stack([np.sqrt(1.0 - z * z) * np.cos(angle), np.sqrt(1.0 - z * z) * np.sin(angle), z])
+    ring = random_ring(n // 2 if name == "prism" else n, rng)
+    if name == "prism":
+        up = np.array([0.0, 0.0, 1.0])
+        return np.concatenate([ring + up, ring - up])
+    tips = [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]] if name == "bipyramid" else [[0.0, 0.0, 2.0]]
+    return np.concatenate([ring, tips])
+
+
+IRREGULAR = (
+    "bipyramid", "bipyramid, turned", "cone", "cone, turned", "prism", "prism, turned", "cap", "doubling",
+)
+
+
 def families(n: int) -> dict[str, np.ndarray]:
     """Bodies with interior, of about n vertices."""
     rounds = max(1, int(np.log2(n / 3)))

@@ -10,7 +10,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hierarchy_families import families, moment_curve, prism, removed_shares, turned
+from hierarchy_families import IRREGULAR, families, irregular, moment_curve, prism, removed_shares, turned
 
 from collide.hull.exact_hull import convex_hull
 from collide.papers.hierarchies.hierarchy import DEGREE_BOUND, build_hierarchy
@@ -43,6 +43,39 @@ def test_bound_and_shares(name):
         assert max(degrees[first:]) <= DEGREE_BOUND, f"{which} of {name}: degrees {degrees}"
         shares = removed_shares(hierarchy)
         assert len(shares) > 8 and shares.min() >= 0.1, f"{which} of {name}: shares {shares}"
+
+
+def assert_bound(hierarchy, label: str) -> None:
+    degrees = largest_degrees(hierarchy)
+    assert max(degrees[1:]) <= DEGREE_BOUND, f"{label}: degrees {degrees}"
+
+
+@pytest.mark.parametrize("seed", [1, 7])
+@pytest.mark.parametrize("name", ["bipyramid", "cone"])
+def test_bound_where_neighbours_of_a_large_vertex_nearly_coincide(name, seed):
+    """Two neighbours of the apex are some 10⁻⁸ apart: a cut whose vertices move far from its edges is not convex."""
+    points = irregular(name, 10_000, np.random.default_rng(seed))
+    hierarchy = build_hierarchy(points, convex_hull(points))
+    assert hierarchy.degrees(0).max() == 10_000
+    assert_bound(hierarchy, f"{name}, seed {seed}")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("n", [3_000, 10_000, 100_000])
+@pytest.mark.parametrize("name", IRREGULAR)
+def test_bound_of_irregular_bodies(name, n, seed):
+    points = irregular(name, n, np.random.default_rng(seed))
+    hull = convex_hull(points)
+    assert_bound(build_hierarchy(points, hull), f"{name}, n = {n}, seed {seed}")
+    assert_bound(polar_of_hull(points, hull).hierarchy, f"polar of {name}, n = {n}, seed {seed}")
+
+
+@pytest.mark.parametrize("name", ["bipyramid", "cone"])
+def test_levels_of_irregular_bodies_are_hulls(name):
+    points = irregular(name, 150, np.random.default_rng(4))
+    points[1] = points[0] + np.array([points[0, 1], -points[0, 0], 0.0]) * 1e-9  # a neighbour as near as that
+    validate_hierarchy(points, build_hierarchy(points, convex_hull(points)), bounded_from=1)
 
 
 @pytest.mark.parametrize(("height", "sides"), [(1.0, 3_000), (1e-6, 3_000)])
