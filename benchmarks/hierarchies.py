@@ -2,7 +2,6 @@
 
     python benchmarks/hierarchies.py                       # some ten minutes to 10^6 vertices; --plot FILE
     python benchmarks/hierarchies.py --table bounds        # depth and size against the bound on the degrees
-    python benchmarks/hierarchies.py --table distance      # distances down the hierarchies, beside the default
 
 Of every body three hierarchies: Dobkin and Kirkpatrick's ("DK"), with bounded degrees ("BDK"), and with bounded
 degrees of its polar ("polar", of which n counts the facets). Depths are exact, so they are fitted: depth = a + b·log2 n
@@ -18,18 +17,15 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-from inputs import directions, rotations, use_tests
+from inputs import use_tests
 
 use_tests("papers/hierarchies")
 import hierarchy_families as families
 
-import collide
-from collide.adapters.bench.claims import Claim, Options, Race, check, grid, main
-from collide.adapters.bench.growth import Panel, line_fit, log2_lines
+from collide.adapters.bench.claims import Claim, Options, check, grid, main
+from collide.adapters.bench.growth import Panel, log2_lines
 from collide.hull.exact_hull import convex_hull
 from collide.papers.hierarchies.hierarchy import DEGREE_BOUND, Hierarchy, build_hierarchy
-from collide.papers.hierarchies.hierarchy_distance import hierarchy_distance
-from collide.papers.hierarchies.packed_hierarchy import PackedHierarchy
 from collide.papers.hierarchies.polar_hull import polar_of_hull
 
 SIZES = (1_000, 10_000, 100_000, 1_000_000)
@@ -103,43 +99,6 @@ def bounds(options: Options, kind: str, vertices: int):
     return rows_of(kind, vertices, (12, 16, 24, 32, 48, 64))
 
 
-def distance(options: Options, kind: str, n: int, bound: int) -> Race:
-    """Two bodies of n vertices, balls a tenth of their size apart: exact counts, and µs a query in one Python loop.
-
-    The default takes all poses in one call.
-    """
-    points, rng = KINDS[kind](n), np.random.default_rng(5)
-    count = 50 if n > 50_000 else 200
-    reach = 1.1 * np.sqrt(np.square(points).sum(axis=1)).max()
-    body, shape = PackedHierarchy(build_hierarchy(points, convex_hull(points), bound)), collide.ConvexHull(points)
-    X_WB = np.tile(np.eye(4), (count, 1, 1))
-    X_WB[:, :3, :3], X_WB[:, :3, 3] = rotations(rng.normal(size=(count, 4))), 2 * reach * directions(rng, count)
-    asked = list(zip(X_WB[:, :3, :3].copy(), X_WB[:, :3, 3].copy()))
-    results = [hierarchy_distance(body, body, *pose) for pose in asked]
-    default = collide.distance(shape, shape, np.eye(4), X_WB).distance
-    check(bool(np.abs([r.distance for r in results] - default).max() < 1e-12), f"distances of {kind} {n}")
-    names = "levels_a", "levels_b", "problems", "looked_at"
-    counts = dict(zip(names, np.mean([r.counters for r in results], axis=0).tolist()))
-    tasks = {"hierarchy": lambda: [hierarchy_distance(body, body, *pose) for pose in asked],
-             "default": lambda: collide.distance(shape, shape, np.eye(4), X_WB)}
-    return Race(tasks, count, {"depth": body.hierarchy.depth} | counts)
-
-
-def distance_cases(options: Options):
-    """The text's own example last, without the bound and with it."""
-    sizes = (256, 1024, 4096, 16384, 65536)[: 3 if options.quick else None]
-    yield from grid(kind=["sphere"], n=sizes, bound=[DEGREE_BOUND])
-    if not options.quick:
-        yield from grid(kind=["degree doubling"], n=[100_000], bound=[0, DEGREE_BOUND])
-
-
-def squares(rows):
-    of = [row for row in rows if row["kind"] == "sphere" and row["engine"] == "hierarchy"]
-    if len(of) > 2:
-        fit = line_fit([np.log2(row["n"]) ** 2 for row in of], [row["levels_b"] for row in of])
-        yield f"levels gone down = {fit.start:.1f} + {fit.slope:.2f}·(log2 n)²"
-
-
 def cases(options: Options):
     return grid(kind=list(KINDS)[: 4 if options.quick else None], vertices=SIZES[: 1 if options.quick else None])
 
@@ -156,8 +115,6 @@ CLAIMS = [
     ), notes=lambda rows: log2_lines(rows, ("which", "kind"), ("depth",))),
     Claim("bounds", "bounds on the degrees", lambda o: grid(kind=KINDS, vertices=SIZES[:1] if o.quick else SIZES[:2]),
           bounds, file="hierarchies-bounds", everywhere=True, asked_for=True),
-    Claim("distance", "µs a distance down the hierarchies", distance_cases, distance, file="hierarchies-distance",
-          everywhere=True, asked_for=True, turns=4, notes=squares),
 ]
 
 

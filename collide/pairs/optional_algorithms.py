@@ -14,11 +14,10 @@ from collide.errors import InvalidArgument, brief
 #: The name of the default narrowphase.
 DEFAULT = "gjk"
 
-#: Query → name of the algorithm → module and function. A function takes (A, B, X_WA, X_WB, check_poses), those of
-#: distances also ``signed``, and returns what the query does.
+#: Query → name of the algorithm → module and function. A function takes (A, B, X_WA, X_WB, check_poses) and
+#: returns what the query does.
 _ALGORITHMS = {
     "collide": {"barba-langerman": ("collide.papers.hierarchies.hierarchy_queries", "collide_by_walk")},
-    "distance": {"dobkin-kirkpatrick": ("collide.papers.hierarchies.hierarchy_queries", "distance_by_descent")},
 }
 
 

@@ -181,31 +181,31 @@ def _with_axes(A, B, X_WA, X_WB, check_poses: bool, threads: int, axes):
 @overload
 def distance(
     A: Shape, B: Shape, X_WA: Pose, X_WB: Pose, *, max_distance: float = ..., signed: bool = ...,
-    check_poses: bool = ..., threads: int = ..., algorithm: str | None = ..., depth: DepthSearch = ...,
+    check_poses: bool = ..., threads: int = ..., depth: DepthSearch = ...,
     like: None = ..., derivatives: Literal[False] = ...,
 ) -> PairResult[Single]: ...
 @overload
 def distance(
     A: Shapes, B: Shapes, X_WA: PoseLike, X_WB: PoseLike, *, max_distance: float = ..., signed: bool = ...,
-    check_poses: bool = ..., threads: int = ..., algorithm: str | None = ..., depth: DepthSearch = ...,
+    check_poses: bool = ..., threads: int = ..., depth: DepthSearch = ...,
     like: None = ..., derivatives: Literal[False] = ...,
 ) -> PairResult: ...
 @overload
 def distance(
     A: Shape, B: Shape, X_WA: Pose, X_WB: Pose, *, derivatives: Literal[True], max_distance: float = ...,
-    signed: bool = ..., check_poses: bool = ..., threads: int = ..., algorithm: str | None = ...,
+    signed: bool = ..., check_poses: bool = ..., threads: int = ...,
     depth: DepthSearch = ..., like: None = ...,
 ) -> PairDerivatives[Single]: ...
 @overload
 def distance(
     A: Shapes, B: Shapes, X_WA: PoseLike, X_WB: PoseLike, *, derivatives: Literal[True], max_distance: float = ...,
-    signed: bool = ..., check_poses: bool = ..., threads: int = ..., algorithm: str | None = ...,
+    signed: bool = ..., check_poses: bool = ..., threads: int = ...,
     depth: DepthSearch = ..., like: None = ...,
 ) -> PairDerivatives: ...
 @overload
 def distance(
     A: Shapes, B: Shapes, X_WA: PoseLike, X_WB: PoseLike, *, max_distance: float = ..., signed: bool = ...,
-    check_poses: bool = ..., threads: int = ..., algorithm: str | None = ..., depth: DepthSearch = ..., like: Any,
+    check_poses: bool = ..., threads: int = ..., depth: DepthSearch = ..., like: Any,
     derivatives: bool = ...,
 ) -> Any: ...
 @asks_prepared_pairs(prepare_pair, PairResult, certify)
@@ -219,7 +219,6 @@ def distance(
     signed=True,
     check_poses=True,
     threads=1,
-    algorithm=None,
     depth="quick",
     like=None,
     derivatives=False,
@@ -239,16 +238,12 @@ def distance(
         0, too, unless the sign is open. Depths are not computed, to save most of the time of overlapping pairs.
     check_poses, threads
         As of `collide`.
-    algorithm : str, optional
-        "gjk" (or ``None``), the default; or "dobkin-kirkpatrick", for two convex polytopes, one thread and no
-        max_distance: gaps are found down bounded hierarchies, and settled in integers. The same numbers to their last
-        digit, and slower (docs/barba-langerman.md).
     depth : str
         Of overlapping bodies that are not convex: "quick", a translation that separates the bodies, short as a rule; or
         "least", the shortest translation known, with lower and upper near each other: of `Compound`s of convex shapes
         0.1 % as a rule, in 30 ms a pose; of meshes 10 % in the median, in 0.5 s, or 3 to 13 % beside curved shapes and
         in unions, in 1 to 2 s. Fields count as the items within the depth, an ``HPolytope(bounded=False)`` as far as
-        the depth reaches (docs/conventions.md). Not with an algorithm. Rows of convex bodies, of bodies apart and of
+        the depth reaches (docs/conventions.md). Rows of convex bodies, of bodies apart and of
         open signs are the same.
     like : str or array, optional
         As of `collide`: fields are arrays of the library, as by `PairResult.to`.
@@ -268,7 +263,7 @@ def distance(
     InvalidPose
         Naming the pose of the batch that is no rigid transform.
     UnsupportedQuery
-        Where the depth is unbounded (half-space in half-space), or the algorithm does not serve the shapes.
+        Where the depth is unbounded (half-space in half-space).
 
     Notes
     -----
@@ -284,23 +279,16 @@ def distance(
         library_of(like)
         result = distance(
             A, B, X_WA, X_WB, max_distance=max_distance, signed=signed, check_poses=check_poses, threads=threads,
-            algorithm=algorithm, depth=depth, derivatives=derivatives,
+            depth=depth, derivatives=derivatives,
         )
         return to_library(result, like)
     if checks.true_or_false("derivatives", derivatives):
-        options = {"check_poses": check_poses, "threads": threads, "algorithm": algorithm}
-        result = distance(A, B, X_WA, X_WB, max_distance=max_distance, signed=signed, depth=depth, **options)
+        options = {"check_poses": check_poses, "threads": threads, "depth": depth}
+        result = distance(A, B, X_WA, X_WB, max_distance=max_distance, signed=signed, **options)
         return pair_derivatives.PairDerivatives(result, partial(_rows_again, check_threads(threads)))
     limit = checks.limit("max_distance", max_distance)
     signed = checks.true_or_false("signed", signed)
     least = checked_depth(depth) and signed
-    if least and algorithm is not None:
-        raise InvalidArgument('depth="least" goes with no algorithm: leave out either')
-    answer = None if algorithm is None else named_algorithm("distance", algorithm)
-    if answer is not None:
-        if limit != math.inf or check_threads(threads) != 1:
-            raise InvalidArgument(f'algorithm="{algorithm}" takes no max_distance, and runs in one thread')
-        return answer(A, B, X_WA, X_WB, check_poses, signed)
     X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
     question = Question(False, limit, signed, checks.true_or_false("check_poses", check_poses))
     if prepare_pair(A, B) and single and not least:

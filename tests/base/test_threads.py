@@ -140,7 +140,5 @@ def test_numbers_of_threads_that_are_none_are_refused(threads):
                 ask(box, box, EYE, X, threads=threads)
     with pytest.raises(InvalidArgument, match="threads"):
         collide.collide(box, box, EYE, EYE, threads=threads, algorithm="barba-langerman")
-    with pytest.raises(InvalidArgument, match="threads"):
-        collide.distance(box, box, EYE, EYE, threads=threads, algorithm="dobkin-kirkpatrick")
     for number in (1, np.int64(1), np.uint8(2), 10**9):
         assert collide.collide(box, box, EYE, EYE, threads=number)

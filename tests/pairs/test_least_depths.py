@@ -178,9 +178,3 @@ def test_other_rows_are_as_they_are():
 def test_other_depths_are_refused(depth):
     with pytest.raises(InvalidArgument, match='depth must be "quick" or "least"'):
         collide.distance(collide.Sphere(1), collide.Sphere(1), I, I, depth=depth)
-
-
-def test_an_algorithm_has_no_least_depths():
-    box = collide.Box((1, 1, 1))
-    with pytest.raises(InvalidArgument, match="goes with no algorithm"):
-        collide.distance(box, box, I, I, depth="least", algorithm="gjk")

@@ -12,18 +12,16 @@ from collide.papers.hierarchies import hierarchy_queries
 
 
 def test_names():
-    for query in ("collide", "distance"):
-        assert named_algorithm(query, None) is None and named_algorithm(query, DEFAULT) is None
+    assert named_algorithm("collide", None) is None and named_algorithm("collide", DEFAULT) is None
     assert named_algorithm("collide", "barba-langerman") is hierarchy_queries.collide_by_walk
-    assert named_algorithm("distance", "dobkin-kirkpatrick") is hierarchy_queries.distance_by_descent
 
 
 @pytest.mark.parametrize(
     ("query", "name", "others"),
     [
         ("collide", "dobkin-kirkpatrick", '"gjk" or "barba-langerman"'),
-        ("distance", "GJK", '"gjk" or "dobkin-kirkpatrick"'),
-        ("distance", ["gjk"], '"gjk" or "dobkin-kirkpatrick"'),
+        ("collide", "GJK", '"gjk" or "barba-langerman"'),
+        ("collide", ["gjk"], '"gjk" or "barba-langerman"'),
     ],
 )
 def test_unknown_names(query, name, others):

@@ -1,4 +1,4 @@
-"""The walk of Barba and Langerman, and distances along hierarchies, from Python: arguments in, answers out.
+"""The walk of Barba and Langerman from Python: arguments in, answers out.
 
 Polytopes only. The body with an interior plays R, whose polar is prepared; B if both or neither have an interior: a
 flat R is thickened for the walk, and the walk's end in integers reads R as given. Answers unproven in doubles are
@@ -7,27 +7,22 @@ proven in integers from the walk's last vertices (`exact_end.py`). Walks lost to
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from collide.base import argument_checks as checks
 from collide.certificates.certificate import VertexPair
-from collide.certificates.make_certificate import certificate_from_normal, certificate_from_pairs, certify
+from collide.certificates.make_certificate import certificate_from_normal, certificate_from_pairs
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.lowering.packed_convex import POINTS
 from collide.lowering.parts import convex_set_of, is_single_convex
-from collide.lowering.shape_table import ShapeTable, pose_table
 from collide.narrowphase.convex_batches import Question
-from collide.narrowphase.convex_kernel_calls import finish_distances, number_of_poses, settle_proposals
+from collide.narrowphase.convex_kernel_calls import number_of_poses
 from collide.pairs.batches import answer_batch
 from collide.pairs.pair_arguments import asked_poses, pose_batch
 from collide.papers.hierarchies.exact_end import ExactEnds, end_exactly, last_corners
-from collide.papers.hierarchies.hierarchy_distance import hierarchy_distance
 from collide.papers.hierarchies.run_walk import no_walks, run_walks
 from collide.papers.hierarchies.walk import APART, MEETING, OPEN_APART, OPEN_MEETING
 from collide.papers.hierarchies.walk_bodies import WalkBody
-from collide.results import PAIR_DTYPE, PairResult
 from collide.shapes.shape import Shape, checked_shape
 from collide.transforms import as_poses
 
@@ -98,7 +93,7 @@ class Walks:
         return f"Walks(<{len(self)} poses>, hits={int(self.hit.sum())}, walked={int(self.walked.sum())})"
 
 
-def walk_body(shape: Shape, algorithm: str = "barba-langerman") -> WalkBody:
+def walk_body(shape: Shape) -> WalkBody:
     """What the walk keeps of a shape, made once. Raises UnsupportedQuery for all but polytopes."""
     try:
         return shape._walk
@@ -106,12 +101,12 @@ def walk_body(shape: Shape, algorithm: str = "barba-langerman") -> WalkBody:
         pass
     name = type(shape).__name__
     if not is_single_convex(shape):
-        raise UnsupportedQuery(f'{name}: algorithm="{algorithm}" takes one convex polytope, no union and no mesh')
+        raise UnsupportedQuery(f'{name}: algorithm="barba-langerman" takes one convex polytope, no union and no mesh')
     packed = convex_set_of(shape)
     if packed.kind != POINTS or packed.radius != 0.0:
         raise UnsupportedQuery(
-            f'{name}: algorithm="{algorithm}" takes convex polytopes (ConvexHull without a radius, Box, HPolytope); '
-            "leave the algorithm out"
+            f'{name}: algorithm="barba-langerman" takes convex polytopes (ConvexHull without a radius, Box, HPolytope);'
+            " leave the algorithm out"
         )
     body = WalkBody(packed.points, getattr(shape, "_hull", None))
     object.__setattr__(shape, "_walk", body)
@@ -138,9 +133,15 @@ def walk(A, B, X_WA, X_WB, *, check_poses: bool = True, trace: bool = False) -> 
     """
     for name, shape in (("A", A), ("B", B)):
         walk_body(checked_shape(f"walk: {name}", shape))
-    X_WA, X_WB, _, ask_default = _with_default(A, B, X_WA, X_WB, check_poses)
-    trace = checks.true_or_false("trace", trace)
-    return walk_poses(A, B, X_WA, X_WB, lambda ids: ask_default(ids, True, 0.0), trace=trace)
+    X_WA, X_WB, _ = asked_poses(A, B, X_WA, X_WB)
+    # Copies: a certificate worked out later is for these poses.
+    X_WA, X_WB = (as_poses(X, name, check=check_poses).copy() for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")))
+
+    def ask_default(ids: np.ndarray) -> np.ndarray:
+        X_A, X_B = (X if len(X) == 1 else np.ascontiguousarray(X[ids]) for X in (X_WA, X_WB))
+        return np.broadcast_to(answer_batch(A, B, X_A, X_B, Question(True, 0.0)), (len(ids),))
+
+    return walk_poses(A, B, X_WA, X_WB, ask_default, trace=checks.true_or_false("trace", trace))
 
 
 def collide_by_walk(A, B, X_WA, X_WB, check_poses: bool):
@@ -148,33 +149,6 @@ def collide_by_walk(A, B, X_WA, X_WB, check_poses: bool):
     walks = walk(A, B, X_WA, X_WB, check_poses=check_poses)
     single = pose_batch(X_WA, "X_WA")[1] and pose_batch(X_WB, "X_WB")[1]
     return bool(walks.hit[0]) if single else walks.hit
-
-
-def distance_by_descent(A, B, X_WA, X_WB, check_poses: bool, signed: bool) -> PairResult:
-    """``distance(..., algorithm="dobkin-kirkpatrick")``: gaps down the hierarchies, depths by the default
-    narrowphase.
-    """
-    for name, shape in (("A", A), ("B", B)):
-        walk_body(checked_shape(f"distance: {name}", shape), "dobkin-kirkpatrick")
-    X_WA, X_WB, single, ask_default = _with_default(A, B, X_WA, X_WB, check_poses)
-    rows = rows_down_hierarchies(A, B, X_WA, X_WB, lambda ids: ask_default(ids, False, math.inf, signed))
-    finish_distances(rows, depths=signed)
-    return PairResult(rows, single, (A, B, X_WA, X_WB), certify)
-
-
-def _with_default(A, B, X_WA, X_WB, check_poses: bool):
-    """(poses, poses, whether single, a function asking the default algorithm at the poses of given numbers).
-
-    Poses are checked and copied: a certificate worked out later is for these poses.
-    """
-    X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
-    X_WA, X_WB = (as_poses(X, name, check=check_poses).copy() for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")))
-
-    def ask_default(ids: np.ndarray, boolean: bool, limit: float, depths: bool = True) -> np.ndarray:
-        X_A, X_B = (X if len(X) == 1 else np.ascontiguousarray(X[ids]) for X in (X_WA, X_WB))
-        return np.broadcast_to(answer_batch(A, B, X_A, X_B, Question(boolean, limit, depths)), (len(ids),))
-
-    return X_WA, X_WB, single, ask_default
 
 
 def walk_poses(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, answer_open, *, trace: bool = False) -> Walks:
@@ -204,70 +178,3 @@ def walk_poses(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, answer_op
         open_ids = np.flatnonzero(~walks.walked)
         hit[open_ids] = answer_open(open_ids)
     return walks
-
-
-def rows_down_hierarchies(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, answer_open) -> np.ndarray:
-    """Rows of `PAIR_DTYPE`: gaps found down both hierarchies (Dobkin and Kirkpatrick 1990), settled in integers.
-
-    Arguments as in `walk_poses`; ``answer_open`` gives whole rows, for pairs that overlap and bodies without interior.
-    ``iterations`` counts small problems.
-    """
-    body_a, body_b = (walk_body(shape, "dobkin-kirkpatrick") for shape in (A, B))
-    n = number_of_poses(X_WA, X_WB)
-    rows = np.zeros(n, dtype=PAIR_DTYPE)
-    settled = np.zeros(n, dtype=bool)
-    X_WA, X_WB = (np.ascontiguousarray(np.broadcast_to(X, (n, 4, 4))) for X in (X_WA, X_WB))
-    if body_a.has_interior and body_b.has_interior:
-        for k in range(n):
-            settled[k] = _propose(body_a, body_b, X_WA[k], X_WB[k], rows[k : k + 1])
-    if settled.any():
-        ids = np.flatnonzero(settled)
-        proposed = rows[ids]
-        packed = [convex_set_of(shape) for shape in (A, B)]
-        poses = pose_table(
-            np.concatenate([X_WA, X_WB]), np.tile(np.eye(4), (2 * n, 1, 1)), np.repeat([p.reach for p in packed], n)
-        )
-        settle_proposals(
-            ShapeTable(packed), poses, np.repeat(np.arange(2), n), np.stack([ids, n + ids], axis=1), proposed
-        )
-        rows[ids] = proposed
-        settled[ids] = ~proposed["hit"]
-    open_ids = np.flatnonzero(~settled)
-    if len(open_ids):
-        rows[open_ids] = answer_open(open_ids)
-    return rows
-
-
-#: Sizes of bodies, and translations between them, whose sixth powers doubles hold: the small problems form such
-#: products.
-_SMALLEST, _LARGEST = 1e-40, 1e40
-
-
-def _is_ordinary(A: WalkBody, B: WalkBody, X_WA: np.ndarray, X_WB: np.ndarray) -> bool:
-    """Whether the descent can work with these sizes: unlike the default it does not scale its numbers."""
-    sizes = [np.abs(body.points).max() for body in (A, B)]
-    reach = max(np.abs(X).max() for X in (X_WA, X_WB))
-    return all(_SMALLEST < size < _LARGEST for size in sizes) and bool(reach < _LARGEST)
-
-
-def _propose(A: WalkBody, B: WalkBody, X_WA: np.ndarray, X_WB: np.ndarray, row: np.ndarray) -> bool:
-    """Enter the nearest vertices of a pair into a row; False where the bodies overlap, as computed in doubles."""
-    if not _is_ordinary(A, B, X_WA, X_WB):
-        return False
-    try:
-        X_AB = np.linalg.inv(X_WA) @ X_WB
-    except np.linalg.LinAlgError:  # unchecked poses may be singular
-        return False
-    nearest = hierarchy_distance(A.hierarchy, B.hierarchy, X_AB[:3, :3], X_AB[:3, 3])
-    used = nearest.vertices[:, 0] >= 0
-    ids = nearest.vertices[used]
-    are_vertices = (ids[:, 0] < len(A.points)).all() and (ids[:, 1] < len(B.points)).all()
-    if not 0.0 < nearest.distance < np.inf or not are_vertices:
-        return False
-    row["distance"] = nearest.distance
-    for name, point in (("point_a", nearest.point_a), ("point_b", nearest.point_b)):
-        row[name] = X_WA[:3, :3] @ point + X_WA[:3, 3]
-    row["count"] = len(ids)
-    row["vertices_a"][:, : len(ids)], row["vertices_b"][:, : len(ids)] = ids.T
-    row["iterations"] = nearest.counters[2]
-    return True
