@@ -22,6 +22,7 @@ from collide.cli import fuzz as cli_fuzz
 from collide.cli import locality_command as cli_locality
 from collide.cli import numbers as cli_numbers
 from collide.cli import pages as cli_pages
+from collide.cli import papers_command as cli_papers
 from collide.cli import solid_commands as cli_solids
 from collide.cli import spheres_command as cli_spheres
 from collide.cli import srdf as cli_srdf
@@ -187,6 +188,9 @@ def parser() -> argparse.ArgumentParser:
     locality = _add(commands, "locality", "how local are these meshes?", cli_locality.EPILOG)
     cli_locality.add_arguments(locality)
     _output_arguments(locality)
+    papers = _add(commands, "papers", "the structures of three papers, each at work", cli_papers.EPILOG)
+    cli_papers.add_arguments(papers)
+    _output_arguments(papers)
     _add_scenes(commands)
     cli_srdf.add_arguments(_add(commands, "srdf", "which links of a robot can collide at all?", cli_srdf.EPILOG))
     spheres = _add(commands, "spheres", "spheres around a robot's links, proven, and audits", cli_spheres.EPILOG)

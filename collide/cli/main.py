@@ -25,6 +25,7 @@ from collide.cli import export_command as cli_export
 from collide.cli import fuzz as cli_fuzz
 from collide.cli import locality_command as cli_locality
 from collide.cli import pages as cli_pages
+from collide.cli import papers_command as cli_papers
 from collide.cli import scenes as cli_scenes
 from collide.cli import solid_commands as cli_solids
 from collide.cli import spheres_command as cli_spheres
@@ -324,7 +325,7 @@ def _write_reports(made: list, place: str | None) -> None:
 _COMMANDS: dict[str, Callable] = {
     "report": _report, "check": _check, "stress": _stress,
     "locality": lambda args: cli_locality.run(args, _progress(args.quiet)),
-    "scenes": _scenes, "doctor": _doctor, "config": cli_config.run,
+    "papers": cli_papers.run, "scenes": _scenes, "doctor": _doctor, "config": cli_config.run,
     "export": lambda args: cli_export.run(args, _progress(args.quiet)),
     "bench": lambda args: cli_bench.run(args, _progress(getattr(args, "quiet", True))),
     "compare": lambda args: FREE if cli_compare.run(args, _progress(args.quiet)) else YES,

@@ -249,7 +249,8 @@ def test_no_command_shows_help(capsys):
 
 @pytest.mark.parametrize(
     "command",
-    ["report", "check", "compare", "locality", "scenes", "doctor", "config", "export", "solid", "cells", "obstacle"],
+    ["report", "check", "compare", "locality", "papers", "scenes", "doctor", "config", "export", "solid", "cells",
+     "obstacle"],
 )
 def test_every_command_teaches_itself(capsys, monkeypatch, command):
     monkeypatch.setenv("COLUMNS", "80")

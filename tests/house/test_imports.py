@@ -114,7 +114,7 @@ TO_GO: dict[str, set[str]] = {}
 LATE = {
     "kernels": {"numba", "llvmlite"},
     "reports": {"rich", "matplotlib"},
-    "cli": {"scenes", "adapters", "papers.hierarchies"},
+    "cli": {"scenes", "adapters", "papers.hierarchies", "polytopes"},
     "sweeps": {"pyarrow", "distributed"},
     "papers.tetrahedra": {"meshio"},
     "shapes": {"PIL", ""},

@@ -185,13 +185,12 @@ GIVEN = {
     "voxels": "",
     "viewers": "open('cell.yaml', 'w').write('{collide: 1, robots: [{urdf: panda.urdf}]}')",
     "distance_fields": "",
-    "barba-langerman": "A = B = collide.ConvexHull(np.random.default_rng(0).normal(size=(60, 3)))\n"
-    "X_WA, X_WB = np.eye(4), collide.pose((1, 0, 0))",
+    "barba-langerman": "from collide.polytopes import planar_pose\n"
+    "X_WBs = np.array([planar_pose((x, 0)) for x in (1, 5)])",
     "casts": "shape = A = B = collide.Box((1, 1, 1)); X_WA = X_WS = np.eye(4); X_WB = collide.pose((3, 0, 0))\n"
     "origins_W = points_W = np.zeros((2, 3)); directions_W = [(1, 0, 0), (0, 1, 0)]; direction_W = (1, 0, 0)\n"
     "world = collide.World(); world.add(B, X_WB)",
     "configuration_obstacles": "",
-    "hierarchical_trees": "",
     "life_of_a_query": "X_WA, X_WB = np.eye(4), collide.pose((1, 0, 0))\n"
     "mesh = collide.Mesh(*collide.tessellate(collide.Sphere(0.5))[:2])",
     "locality": "",
@@ -205,7 +204,6 @@ GIVEN = {
     "B, X_WA, X_WB = collide.TetMesh(vertices, cells), np.eye(4), collide.pose((0.1, 0, 0))",
     "partitions": "mesh = collide.Mesh(*collide.tessellate(collide.Box((1, 1, 1)))[:2]); points = np.zeros((2, 3))\n"
     "low, high = (-2, -2, -2), (2, 2, 2)",
-    "planar": "from collide.polytopes import planar_pose\nX_WBs = np.array([planar_pose((x, 0)) for x in (1, 5)])",
     "derivatives": "robot = collide.Robot.load('two_links.urdf'); Q = np.array([[0.1], [0.4]])\n"
     "world = collide.World(); world.add(collide.Sphere(0.1), collide.pose((0.5, 0.5, 0)), name='ball')",
     "polytopes": "",
