@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from collide.certificates.certificate import Certificate, CertificateRefused
     from collide.certificates.make_certificate import certify
     from collide.certificates.verify import verify
+    from collide.contact.contact_derivatives import ContactDerivatives, contact_derivatives
     from collide.contact.contact_query import contacts
     from collide.contact.contact_rows import Contacts
     from collide.derivatives.pair_derivatives import PairDerivatives
@@ -127,6 +128,7 @@ _HOMES = {
     "collide.certificates.certificate": ("Certificate", "CertificateRefused"),
     "collide.certificates.make_certificate": ("certify",),
     "collide.certificates.verify": ("verify",),
+    "collide.contact.contact_derivatives": ("ContactDerivatives", "contact_derivatives"),
     "collide.contact.contact_query": ("contacts",),
     "collide.contact.contact_rows": ("Contacts",),
     "collide.spheres.enclosing_spheres": ("EnclosingSpheres", "enclosing_spheres"),
@@ -197,21 +199,22 @@ _RENAMED = {
 __all__ = [
     "BooleanResult", "Box", "Capsule", "CellOverlaps", "CellPlanes", "Certificate", "CertificateRefused",
     "CertifiedBoxes", "CertifiedEdges", "CertifiedMotion", "CollideError", "Compound", "Cone", "ConfigurationObstacle",
-    "Contacts", "ConvexCells", "ConvexHull", "ConvexParts", "ConvexPolygon", "Cylinder", "DrawnConfigurations",
-    "Ellipsoid", "EnclosingSpheres", "FacetPairs", "GridDistances", "HPolytope", "Halfspace", "HeightField", "How",
-    "ImpactDerivatives", "InvalidArgument", "InvalidPose", "InvalidShape", "LinkPair", "Located", "Mesh",
-    "MissingExtra", "MotionPlan", "NestedHull", "OcTree", "OcTreeLeaves", "OverlapVolume", "Overlay", "PairDerivatives",
-    "PairResult", "PartitionSize", "PieceAudit", "PlanarObstacle", "Plane", "PointCloud", "Portals", "Proposal",
-    "RayHits", "RepairedMesh", "Robot", "RobotBatch", "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions",
+    "ContactDerivatives", "Contacts", "ConvexCells", "ConvexHull", "ConvexParts", "ConvexPolygon", "Cylinder",
+    "DrawnConfigurations", "Ellipsoid", "EnclosingSpheres", "FacetPairs", "GridDistances", "HPolytope", "Halfspace",
+    "HeightField", "How", "ImpactDerivatives", "InvalidArgument", "InvalidPose", "InvalidShape", "LinkPair",
+    "Located", "Mesh", "MissingExtra", "MotionPlan", "NestedHull", "OcTree", "OcTreeLeaves", "OverlapVolume",
+    "Overlay", "PairDerivatives", "PairResult", "PartitionSize", "PieceAudit", "PlanarObstacle", "Plane",
+    "PointCloud", "Portals", "Proposal", "RayHits", "RepairedMesh", "Robot", "RobotBatch", "RobotChecker",
+    "RobotDistances", "SceneError", "SelfCollisions",
     "Shape", "ShapeCasts", "ShapeSet", "SignedDistanceGrid", "SignedDistances", "SmoothedDistances", "SoftMinimum",
     "SpacePartition", "Sphere", "Spline", "SweepResults", "SweptMesh", "TetMesh", "TimeOfImpact", "Uniqueness",
     "UnknownBody", "UnsupportedQuery", "VoxelGrid", "World", "WorldBatch", "WorldBatchResult", "WorldHits",
-    "WorldResult", "audit_pieces", "boolean", "certify", "collide", "combine", "configuration_obstacle", "contacts",
-    "contains", "distance", "enclosing_spheres", "facet_pairs", "get_include", "get_library", "impact_derivatives",
-    "moved_poses", "nested_hulls", "overlap_volume", "overlapping_cells", "overlay", "plan", "pose", "poses",
-    "poses_in_motion", "propose_disabled_pairs", "raycast", "read_sweep", "repaired", "self_collisions",
-    "self_overlapping_cells", "shape_cast", "signed_distances", "smoothed_distances", "soft_minimum", "sweep",
-    "tessellate", "time_of_impact", "to_library", "verify", "walk",
+    "WorldResult", "audit_pieces", "boolean", "certify", "collide", "combine", "configuration_obstacle",
+    "contact_derivatives", "contacts", "contains", "distance", "enclosing_spheres", "facet_pairs", "get_include",
+    "get_library", "impact_derivatives", "moved_poses", "nested_hulls", "overlap_volume", "overlapping_cells",
+    "overlay", "plan", "pose", "poses", "poses_in_motion", "propose_disabled_pairs", "raycast", "read_sweep",
+    "repaired", "self_collisions", "self_overlapping_cells", "shape_cast", "signed_distances", "smoothed_distances",
+    "soft_minimum", "sweep", "tessellate", "time_of_impact", "to_library", "verify", "walk",
 ]
 
 

@@ -57,7 +57,7 @@ ROOMS = {
     },
     "contact": {
         "errors", "base", "kernels", "transforms", "results", "numerics", "hull", "curved", "support", "mesh", "shapes",
-        "lowering", "narrowphase", "pairs",
+        "lowering", "narrowphase", "derivatives", "pairs",
     },
     "hull_levels": {"errors", "base", "hull", "shapes", "lowering", "pairs"},
     "casts": {
