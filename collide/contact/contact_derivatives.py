@@ -99,16 +99,16 @@ def contact_derivatives(
     O(f) a row beside `contacts` and `distance`, for f faces of the bodies, by the implicit function theorem
     (docs/derivatives.md).
     """
-    manifolds = contacts(A, B, X_WA, X_WB, margin=margin, max_contacts=max_contacts)
+    rows_of = contacts(A, B, X_WA, X_WB, margin=margin, max_contacts=max_contacts)
     poses_a, poses_b, _ = asked_poses(A, B, X_WA, X_WB)
-    moved, reason = np.full((len(manifolds.rows), 10, 12), np.nan), []
-    for k, begin, end in zip(range(len(manifolds.starts) - 1), manifolds.starts.tolist(), manifolds.starts[1:].tolist()):
+    moved, reason = np.full((len(rows_of.rows), 10, 12), np.nan), []
+    for k, begin, end in zip(range(len(rows_of.starts) - 1), rows_of.starts.tolist(), rows_of.starts[1:].tolist()):
         if begin < end:
             bodies = shape_at(A, k), shape_at(B, k)
             X = pose_at(poses_a, k), pose_at(poses_b, k)
-            reason += _differentiate(bodies, X, manifolds.rows[begin:end], moved[begin:end])
+            reason += _differentiate(bodies, X, rows_of.rows[begin:end], moved[begin:end])
     by = [moved[:, 0], moved[:, 1:4], moved[:, 4:7], moved[:, 7:]]
-    return ContactDerivatives(manifolds, *(of[..., first : first + 6] for of in by for first in (0, 6)), reason)
+    return ContactDerivatives(rows_of, *(of[..., first : first + 6] for of in by for first in (0, 6)), reason)
 
 
 class _Core(NamedTuple):
