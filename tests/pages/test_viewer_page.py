@@ -522,6 +522,14 @@ def test_a_bound_keeps_its_sign_and_counts_say_of_what(page):
     assert page.texts("#table-colliding .pager") == ["the filters hide it"]
 
 
+def test_volumes_of_overlaps_stand_in_a_table(page):
+    small, large = {"a": "x", "b": "y", "volume": 2e-9}, {"a": "p", "b": "q", "volume": 0.5}
+    data = report_of("volumes") | {"overlaps": [small, large]}
+    page.open(page.write("volumes", report=data, drawing=drawing_of([box(1.0)], [])))
+    assert page.texts("#table-overlaps td.number") == ["0.5 m³", "2 mm³"]
+    assert "overlaps" not in "".join(page.texts("#table-further td"))
+
+
 def test_a_column_has_one_unit(page):
     rows = [pair(f"a{k}", f"b{k}", gap) for k, gap in enumerate((2e-6, 3.5e-4, 0.02))]
     page.open(page.write("units", report=report_of("units", near=rows), drawing=drawing_of([box(1.0)], [])))

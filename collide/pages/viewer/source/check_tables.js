@@ -1,10 +1,10 @@
 /** What `collide check` found: which pairs count, which of them are new (`collide/reports/checking.py`). */
-import { columnLength, columnOf } from "./lengths.js";
+import { columnLength, columnFormat } from "./lengths.js";
 import { nameColumn } from "./pair_tables.js";
 
 /** A table for every state that was checked. */
 export function checkTables(checks) {
-  return checks.map((check, k) => [check, k, columnOf(check.findings.map((row) => row.distance))]).map(([check, k, length]) => ({
+  return checks.map((check, k) => [check, k, columnFormat(check.findings.map((row) => row.distance))]).map(([check, k, length]) => ({
     id: `check-${k}`, title: check.label ? `CHECK OF ${check.label}` : "CHECK",
     hint: `${check.fails ? "fails" : "passes"}: ${check.verdict}`, of: "pair", repeats: true,
     rows: check.findings,

@@ -5,7 +5,7 @@
  * A column: `{title, kind, cell(row), value(row)}`, kind as in the terminal (name, number, label, text); `narrow: false`
  * leaves it out of small windows, where the unfolded row has it.
  */
-import { bracketWidth, briefLength, columnOf, counted, secondsText } from "./lengths.js";
+import { bracketWidth, briefLength, columnFormat, counted, secondsText, volumeText } from "./lengths.js";
 import { element, nameNode } from "./text_nodes.js";
 import { verdictNode } from "./verdicts.js";
 
@@ -14,6 +14,7 @@ const STAGES = ["read", "meshes", "pack", "broadphase", "narrowphase", "report"]
 const TOLD = new Set([
   "schema", "verdict", "scene", "query", "pairs", "colliding", "shallow", "touching", "near", "meshes", "approximations",
   "unanswered", "skipped", "proofs", "work", "notes", "seconds", "versions", "trajectory", "geometry", "states", "check",
+  "overlaps",
 ]);
 
 /** Tables of a report's pairs, then of everything that a reader has to know besides. */
@@ -27,6 +28,7 @@ export function reportTables(report) {
     pairTable("near", "NEAR", `apart, nearer than ${briefLength(query.clearance)}, nearest first`,
       report.near ?? [], "distance"),
     pairTable("touching", "TOUCHING", "gap and overlap below rounding", report.touching ?? [], "within"),
+    overlapTable(report),
     ...besides(report),
   ].filter((table) => table.rows.length);
 }
@@ -57,7 +59,7 @@ export function nameColumn(title, key) {
 
 /** Depths, distances or widths of rows, in one unit. */
 export function measureColumn(measure, rows) {
-  const text = columnOf(rows.map((row) => measured(row, measure)));
+  const text = columnFormat(rows.map((row) => measured(row, measure)));
   return {
     title: measure, kind: "number", value: (row) => measured(row, measure),
     cell: (row) => `${boundSign(row, measure)}${text(measured(row, measure))}`,
@@ -96,6 +98,18 @@ function bracketNotes(rows, measure) {
 }
 
 // --- what is told besides -------------------------------------------------------------------------
+
+/** What colliding solids have in common, the largest first. */
+function overlapTable(report) {
+  return {
+    id: "overlaps", title: "OVERLAPS", hint: "volumes that colliding solids have in common", of: "pair", repeats: true,
+    rows: [...(report.overlaps ?? [])].sort((a, b) => b.volume - a.volume),
+    columns: [
+      nameColumn("body A", "a"), nameColumn("body B", "b"),
+      { title: "volume", kind: "number", cell: (row) => volumeText(row.volume), value: (row) => row.volume },
+    ],
+  };
+}
 
 function besides(report) {
   const text = (title, key, narrow) => ({ title, kind: "text", cell: (row) => row[key] ?? "", value: (row) => row[key], narrow });

@@ -1,5 +1,5 @@
 /** Tables of several states and of a trajectory (`collide/reports/state_reports.py`). */
-import { briefLength, columnLength, columnOf, counted } from "./lengths.js";
+import { briefLength, columnLength, columnFormat, counted } from "./lengths.js";
 import { factTable, isBound, measureColumn, nameColumn, pairTable } from "./pair_tables.js";
 import { verdictNode } from "./verdicts.js";
 
@@ -60,7 +60,7 @@ function motionTable(verdict, title, hint, trajectory, measure) {
 
 function depthOrDistance(measure, rows) {
   const size = (row) => (row.distance === null ? Infinity : Math.abs(row.distance));
-  const text = columnOf(rows.map(size));
+  const text = columnFormat(rows.map(size));
   return { ...measureColumn(measure, []), value: size, cell: (row) => `${isBound(row) ? "≤ " : ""}${text(size(row))}` };
 }
 
@@ -102,7 +102,7 @@ export function stateTable(report) {
     title: name, kind: "number", cell: (row) => String(row.report[name].length), value: (row) => row.report[name].length,
   });
   const deepest = (row) => (row.report.colliding.length ? row.report.colliding[0].depth ?? Infinity : 0);
-  const text = columnOf(report.states.map(deepest));
+  const text = columnFormat(report.states.map(deepest));
   return {
     id: "states", title: "STATES", hint: report.verdict.text, of: "state", rows: report.states.map((entry, state) => ({ ...entry, state })),
     columns: [

@@ -1,5 +1,5 @@
 /** States: a slider, a strip of verdicts over time, the least clearance as a curve, and a button that plays. */
-import { columnLength, columnOf, counted } from "./lengths.js";
+import { columnLength, columnFormat, counted } from "./lengths.js";
 import { element, printable, refill, svgElement } from "./text_nodes.js";
 import { lookOf, verdictNode } from "./verdicts.js";
 
@@ -208,7 +208,7 @@ function curveText(clearances) {
   if (!known.length) return "";
   const [low, high] = [Math.min(...known), Math.max(...known)];
   const name = low < 0 ? "signed distance of the nearest pair" : "least clearance";
-  const text = columnOf(known);
+  const text = columnFormat(known);
   const range = low === high ? `${text(low)} in every state` : `from ${text(low)} to ${text(high)}`;
   const gaps = known.length < clearances.length ? `, without a number in ${counted(clearances.length - known.length, "state")}` : "";
   return `${name} ${range}${gaps}${low < 0 && known.length > 1 ? "; below the line bodies overlap" : ""}`;
