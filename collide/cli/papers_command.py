@@ -172,6 +172,7 @@ def _boolean() -> str:
 
     box = collide.Box((1.0, 1.0, 1.0))
     made = collide.boolean(box, box, np.eye(4), _shifted(0.5), "union")
+    assert made.mesh is not None
     return f"two boxes, joined, have volume {made.mesh.volume:.3g} and {len(made.mesh.faces)} facets"
 
 
@@ -195,7 +196,7 @@ def _pruning(algorithm: str, n: int, d: int) -> str:
     points[:, 0] += 6.0
     r = polytopes.meets(points, normals, offsets, algorithm=algorithm)
     polytopes.verify(points, normals, offsets, r)
-    read = r.counters["points_read"] + r.counters["halfspaces_read"]
+    read = int(r.counters["points_read"]) + int(r.counters["halfspaces_read"])
     return f"{n:,} points, {n:,} half-spaces of R^{d} {_met(r.hit)}: {read:,} rows read, proof checked"
 
 

@@ -108,7 +108,8 @@ def contact_derivatives(
             X = pose_at(poses_a, k), pose_at(poses_b, k)
             reason += _differentiate(bodies, X, rows_of.rows[begin:end], moved[begin:end])
     by = [moved[:, 0], moved[:, 1:4], moved[:, 4:7], moved[:, 7:]]
-    return ContactDerivatives(rows_of, *(of[..., first : first + 6] for of in by for first in (0, 6)), reason)
+    gap_a, gap_b, a_a, a_b, b_a, b_b, normal_a, normal_b = (of[..., k : k + 6] for of in by for k in (0, 6))
+    return ContactDerivatives(rows_of, gap_a, gap_b, a_a, a_b, b_a, b_b, normal_a, normal_b, reason)
 
 
 class _Core(NamedTuple):

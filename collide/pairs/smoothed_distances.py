@@ -32,6 +32,8 @@ from collide.transforms import rotation_from_unit
 if TYPE_CHECKING:
     from collide.transforms import PoseLike
 
+#: Of wider angles [rad] nothing is left but that every rotation is as likely.
+_WIDEST = 10.0
 #: Below this angle [rad] the series of h'(θ) / (θ h(θ)) is used: −1/6 − θ²/360, off by θ⁴/15120.
 _SMALL = 2.0**-6
 _MAX_SAMPLES = 1 << 20
@@ -68,7 +70,8 @@ def smoothed_distances(
     X_WA, X_WB : (4, 4) or (N, 4, 4) array_like, float64
         Poses [m].
     angle, length : float
-        Standard deviations σ [rad] and τ [m] of the motions along each axis of B. Of zeroth order both are above 0.
+        Standard deviations σ [rad], at most 10, and τ [m] of the motions along each axis of B. Of zeroth order both are
+        above 0.
     samples : int
         Motions of each pair of poses, an even number; the same for all, so that means are smooth functions of poses.
     order : 1 or 0
@@ -93,6 +96,8 @@ def smoothed_distances(
     for name, shape in (("A", A), ("B", B)):
         checked_shape(f"smoothed_distances: {name}", shape)
     sigma, tau = checks.length("angle", angle), checks.length("length", length)
+    if sigma > _WIDEST:
+        raise InvalidArgument(f"angle is a standard deviation of rotations, at most {_WIDEST:g} rad, got {sigma:g}")
     n = checks.integer("samples", samples, 4)
     if n % 2 or n > _MAX_SAMPLES:
         raise InvalidArgument(f"samples must be an even number, 4 ... {_MAX_SAMPLES}, got {n}")
