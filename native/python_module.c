@@ -226,7 +226,7 @@ static PyObject *words[WORDS + 1], *one = NULL;
 struct query {
     PyMethodDef method;
     enum word length, option;   /* its own arguments: a length, and one that is none (WORDS where there is no such) */
-    enum word none[2];          /* arguments that may be None */
+    enum word none[2];          /* arguments that may be None (WORDS likewise) */
     double least, most;         /* of the length, unless it is 0 [m] */
     PyObject *function, *prepare, *result, *certify;
     PyObject *usual_length, *usual_option;
@@ -396,7 +396,7 @@ static PyObject *ask_contacts(PyObject *, PyObject *const *, Py_ssize_t, PyObjec
 #define ASKS(name) {#name, (PyCFunction)(void (*)(void))ask_##name, METH_FASTCALL | METH_KEYWORDS, NULL}
 static struct query queries[] = {
     {.method = ASKS(collide), .length = SECURITY_MARGIN, .option = WORDS, .none = {AXES, ALGORITHM}},
-    {.method = ASKS(distance), .length = MAX_DISTANCE, .option = SIGNED, .none = {ALGORITHM, ALGORITHM}},
+    {.method = ASKS(distance), .length = MAX_DISTANCE, .option = SIGNED, .none = {WORDS, WORDS}},
     {.method = ASKS(contacts), .length = MARGIN, .option = MAX_CONTACTS, .none = {WORDS, WORDS}},
 };
 

@@ -56,7 +56,7 @@ def prepared_boxes() -> tuple[collide.Box, collide.Box]:
             collide.distance,
             {
                 "max_distance": math.inf, "signed": True, "depth": "quick", "check_poses": True, "threads": 1,
-                "algorithm": None, "derivatives": False, "like": None,
+                "derivatives": False, "like": None,
             },
         ),
         (collide.contacts, {"margin": 0.0, "max_contacts": 8, "check_poses": True, "threads": 1}),
