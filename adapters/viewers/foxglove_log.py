@@ -10,6 +10,7 @@ import numpy as np
 from collide.adapters.hosts.fcl_transform import quaternion_of
 from collide.adapters.viewers.viewed import LEAST_ARROW, Mark, Viewed, body_paths, viewed
 from collide.errors import MissingExtra
+from collide.numerics.frames import frame_along
 from collide.scenes.description import Scene
 from collide.worlds.world import World
 
@@ -107,7 +108,7 @@ def _body(messages: Any, stamp: Any, view: Viewed, name: str, frame: str, colour
             )
         ]
     if look.points is not None:
-        for centre, radius in zip(look.points.centres, np.maximum(look.points.radii, 1e-3 * view.size).tolist()):
+        for centre, radius in zip(look.points.centres, look.points.radii.tolist()):
             size = messages.Vector3(x=2.0 * radius, y=2.0 * radius, z=2.0 * radius)
             spheres.append(
                 messages.SpherePrimitive(pose=_pose(messages, centre, np.eye(3)), size=size, color=paint)
@@ -127,7 +128,7 @@ def _pairs(messages: Any, stamp: Any, view: Viewed, marks: list[Mark]) -> Any:
         paint, head = _colour(messages, mark.colour), min(0.3 * least, length)
         arrows.append(
             messages.ArrowPrimitive(
-                pose=_pose(messages, mark.point, _turn_of_x(mark.arrow / length)), shaft_length=length - head,
+                pose=_pose(messages, mark.point, frame_along(mark.arrow / length).T), shaft_length=length - head,
                 shaft_diameter=0.2 * least, head_length=head, head_diameter=0.5 * least, color=paint,
             )
         )
@@ -141,11 +142,3 @@ def _pairs(messages: Any, stamp: Any, view: Viewed, marks: list[Mark]) -> Any:
     return messages.SceneEntity(
         timestamp=stamp, frame_id=WORLD_FRAME, id="pairs", frame_locked=True, arrows=arrows, texts=texts
     )
-
-
-def _turn_of_x(n: np.ndarray) -> np.ndarray:
-    """A rotation that takes x to the unit vector n."""
-    aside = np.eye(3)[np.argmin(np.abs(n))]
-    y = np.cross(n, aside)
-    y /= np.linalg.norm(y)
-    return np.column_stack([n, y, np.cross(n, y)])

@@ -8,6 +8,7 @@ import numpy as np
 
 from collide.adapters.viewers.viewed import LEAST_ARROW, Moment, Viewed, body_paths, viewed
 from collide.errors import InvalidArgument, MissingExtra
+from collide.pages.drawn_shapes import Drawn
 from collide.scenes.description import Scene
 from collide.worlds.world import World
 
@@ -59,7 +60,7 @@ def to_rerun(
                 recording.set_time("time", duration=moment.time)
         for name, place in places.items():
             if before is None or moment.colours[name] != before.colours[name]:
-                _log_look(rerun, recording, place, view, name, moment.colours[name])
+                _log_look(rerun, recording, place, view.looks[name], moment.colours[name])
             X_WB = moment.poses[name]
             if before is None or (X_WB != before.poses[name]).any():
                 recording.log(place, rerun.Transform3D(translation=X_WB[:3, 3], mat3x3=X_WB[:3, :3]))
@@ -68,8 +69,7 @@ def to_rerun(
     return recording
 
 
-def _log_look(rerun: Any, recording: Any, place: list, view: Viewed, name: str, colour) -> None:
-    look = view.looks[name]
+def _log_look(rerun: Any, recording: Any, place: list, look: Drawn, colour) -> None:
     if len(look.faces):
         mesh = rerun.Mesh3D(
             vertex_positions=look.vertices.astype(np.float32), triangle_indices=look.faces.astype(np.uint32),
@@ -77,8 +77,8 @@ def _log_look(rerun: Any, recording: Any, place: list, view: Viewed, name: str, 
         )
         recording.log(place, mesh)
     if look.points is not None:
-        radii = np.maximum(look.points.radii, 1e-3 * view.size)
-        recording.log(place, rerun.Points3D(look.points.centres, radii=radii, colors=[*colour, 255]))
+        points = rerun.Points3D(look.points.centres, radii=look.points.radii, colors=[*colour, 255])
+        recording.log(place, points)
 
 
 def _log_marks(rerun: Any, recording: Any, view: Viewed, moment: Moment) -> None:

@@ -24,12 +24,15 @@ from collide.reports.state_reports import Stated
 from collide.reports.trajectory_report import at_start, watched
 from collide.scenes.description import Scene
 from collide.scenes.loaders.trajectories import Trajectory, read_trajectory
+from collide.shapes.shape import Shape
 from collide.worlds.world import World
 
 #: Pairs of a class that are drawn at a moment: the deepest or nearest.
 MAX_PAIRS = 200
 #: Arrows are at least this long and labels stand this high, as a part of the scene's size.
 LEAST_ARROW = 1.0 / 50.0
+#: Balls of clouds are drawn with at least this radius, as a part of the scene's size.
+_LEAST_RADIUS = 1e-3
 _ENDS = ("distance", "lower", "upper")
 
 
@@ -85,13 +88,21 @@ def viewed(
     stated = Stated("", scene, reports.make(scene, clearance, min_depth, progress))
     size = float(body_sizes(scene.bodies).max(initial=0.0)) or 1.0
     shapes = {id(body.shape): body.shape for body in scene.bodies}
-    by_shape = {key: drawn([(shape, np.eye(4))], 2.0 * size) for key, shape in shapes.items()}
+    by_shape = {key: _look(shape, size) for key, shape in shapes.items()}
     looks = {body.name: by_shape[id(body.shape)] for body in scene.bodies}
     if path is None:
         return Viewed(looks, size, [_moment_of_report(stated, size)])
     watch = watched(scene, path, clearance=clearance, min_depth=min_depth, progress=progress, keep=True)
     stated = stated._replace(watch=watch)
     return Viewed(looks, size, list(_moments_of_trajectory(stated, size)))
+
+
+def _look(shape: Shape, size: float) -> Drawn:
+    """A shape in its frame, balls of clouds large enough to be seen.   size : of the scene [m]."""
+    look = drawn([(shape, np.eye(4))], 2.0 * size)
+    if look.points is None:
+        return look
+    return look._replace(points=look.points._replace(radii=np.maximum(look.points.radii, _LEAST_RADIUS * size)))
 
 
 def _waypoints(caller: str, scene: Scene, trajectory: Any) -> Trajectory:
@@ -126,7 +137,7 @@ def _moments_of_trajectory(stated: Stated, size: float) -> Iterator[Moment]:
     """At the samples that a page would show: changes of verdict, the nearest approach, and others between."""
     watch = stated.watch
     samples, _ = drawn_states.samples_of_page(watch)
-    at_start = _moment_of_report(stated, size)
+    first = _moment_of_report(stated, size)
     standing = _marks_of_report(stated.report, set(watch.moving), size)
     free = dict.fromkeys(watch.moving, COLOURS["free"])
     for k, moment in zip(samples.tolist(), drawn_states.moments(stated, samples)):
@@ -134,8 +145,8 @@ def _moments_of_trajectory(stated: Stated, size: float) -> Iterator[Moment]:
             _mark(name, watch.names[int(row["a"])], watch.names[int(row["b"])], row, size)
             for name, indices in moment.look.by_class.items() for row in moment.look.rows[indices[:MAX_PAIRS]]
         ]
-        poses = {**at_start.poses, **dict(zip(watch.moving, moment.poses))}
-        colours = {**at_start.colours, **free, **_colours(moment.verdicts)}
+        poses = {**first.poses, **dict(zip(watch.moving, moment.poses))}
+        colours = {**first.colours, **free, **_colours(moment.verdicts)}
         time = None if watch.path.times is None else float(watch.path.times[k])
         yield Moment(poses, colours, standing + marks, time, f"{100 * watch.path.share[k]:.3g} %")
 

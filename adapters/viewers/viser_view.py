@@ -81,11 +81,10 @@ def _body(server: Any, view: Viewed, name: str, path: str) -> list[Any]:
             )
         )
     if look.points is not None:
-        radius = max(float(look.points.radii.max(initial=0.0)), 1e-3 * view.size)
         handles.append(
             server.scene.add_point_cloud(
                 f"{place}/points" if handles else place, look.points.centres.astype(np.float32), colour,
-                point_size=2.0 * radius, point_shape="circle", precision="float32",
+                point_size=2.0 * float(look.points.radii.max()), point_shape="circle", precision="float32",
             )
         )
     return handles

@@ -94,7 +94,7 @@ def _overlap(A, B) -> dict | None:
     if overlap is None:
         return None
     known = {"volume": overlap["volume"], "certified": True}
-    common = common_solid(A, B)
+    common = common_solid(A, B) if overlap["volume"] else None
     if common is None or len(common.faces) > _MAX_TRIANGLES:
         return known
     origin = common.vertices.mean(axis=0)
